@@ -7,6 +7,7 @@ use super::mass::{Products, pack};
 use super::point::PointLaw;
 use super::quadratic::QuadraticPiece;
 use super::scratch::Scratch;
+use super::viscous::Viscous;
 use super::{BlockCsr, ElementKind, Model, ModelError, Volumetric};
 use crate::cut::CutMesh;
 use crate::element::{Points, hex8, quadrature};
@@ -177,6 +178,7 @@ impl Model {
             volumetric,
             point,
             fibres: Fibres::default(),
+            viscous: Viscous::default(),
             regions: Regions::default(),
             density_kg_m3: material.density_kg_m3,
             rest,

@@ -151,10 +151,16 @@ impl Model {
             true => 0.0,
             false => (0..Q).map(|q| point(q, &|F| self.fibres.energy(law.law, F))).sum(),
         };
-        let Some(split) = self.remedy(e) else {
-            return fibres + (0..Q).map(|q| point(q, &|F| law.energy(F))).sum::<f64>();
+        let spring = |q: usize| self.viscous.spring(e * Q + q, law.lame.mu);
+        let springs: f64 = match self.viscous.is_off() {
+            true => 0.0,
+            false => (0..Q).map(|q| point(q, &|F| spring(q).energy(law.law, F))).sum(),
         };
-        let shear: f64 = fibres + (0..Q).map(|q| point(q, &|F| split.shear_energy(F))).sum::<f64>();
+        let more = fibres + springs;
+        let Some(split) = self.remedy(e) else {
+            return more + (0..Q).map(|q| point(q, &|F| law.energy(F))).sum::<f64>();
+        };
+        let shear: f64 = more + (0..Q).map(|q| point(q, &|F| split.shear_energy(F))).sum::<f64>();
         let (F, share) = match &self.averaging {
             Some(averaging) => (deformation_gradient::<N>(&x, self.gradients(e, 0)), averaging.kept),
             None => (self.mean_gradient::<N>(e, &x), 1.0),
@@ -229,6 +235,11 @@ impl Model {
                 energy += w * self.fibres.energy(law.law, &F);
                 P += self.fibres.stress(law.law, &F);
             }
+            if !self.viscous.is_off() {
+                let spring = self.viscous.spring(e * self.kind.points() + q, law.lame.mu);
+                energy += w * spring.energy(law.law, &F);
+                P += spring.stress(law.law, &F);
+            }
             add_forces(&P, g, w, f);
         }
         // Volume at one point: at all eight it would lock.
@@ -283,6 +294,10 @@ impl Model {
             let F = deformation_gradient::<N>(&x, g);
             if !self.fibres.is_empty() {
                 add_upper_blocks::<N>(&self.fibres.tangent(law.law, &F), g, weights[q], K);
+            }
+            if !self.viscous.is_off() {
+                let spring = self.viscous.spring(e * self.kind.points() + q, law.lame.mu);
+                add_upper_blocks::<N>(&spring.tangent(law.law, &F, point_kind), g, weights[q], K);
             }
             if kind == Tangent::Exact {
                 let D = from.map_or(Matrix3::zeros(), |from| F - deformation_gradient::<N>(&from, g));

@@ -30,6 +30,8 @@ mod parallel;
 mod mass;
 mod mass_matrix;
 mod rotated;
+mod viscous;
+mod relaxing;
 
 pub use crate::material::Tangent;
 pub use block_csr::BlockCsr;

@@ -6,6 +6,7 @@ use super::averaging::NodeAverage;
 use super::mass::{MassSharing, Products};
 use super::point::PointLaw;
 use super::scratch::Scratch;
+use super::viscous::Viscous;
 use super::{BlockCsr, ElementKind, ModelError, Volumetric};
 use crate::element::{Point, Points, Spring, deformation_gradient};
 use crate::material::{Fibres, Lame, Law, Region, Regions};
@@ -19,6 +20,8 @@ pub struct Model {
     pub(super) point: PointLaw,
     /// Families of fibres in all elements.
     pub(super) fibres: Fibres,
+    /// Terms of a Prony series in all elements.
+    pub(super) viscous: Viscous,
     /// Regions with other constants, and the region of every element (piece, where the mesh is cut).
     pub(super) regions: Regions,
     /// Density [kg/m³] of the body. Regions of another density stand for as much volume as would have their mass.

@@ -93,6 +93,7 @@ impl Body {
         let (kinetic_j, momentum) = (self.kinetic_energy(), self.momentum());
         // On the general path the model may have remedies against locking, whose energy belongs to all cells.
         let modelled_j = self.dynamics.model().map(|_| self.elastic_energy());
+        let before = self.outline();
         let mut report = AdaptReport::default();
         let Self { space, .. } = self;
         if let (false, Some(octree)) = (refine.is_empty(), space.octree_mut()) {
@@ -108,6 +109,7 @@ impl Body {
             return Ok(report);
         }
         self.dynamics.follow_elements(&mut self.team, &*self.space)?;
+        self.carry_viscous(before);
         self.follow_topology();
         report.kinetic_change_j = self.kinetic_energy() - kinetic_j;
         if let Some(elastic_j) = modelled_j {

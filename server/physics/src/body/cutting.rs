@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::relaxing::Outline;
 use super::snapping::FaceCut;
 use super::{Body, BodyError};
 use crate::cut::{BladeSweep, CutError, CutReport, NewCopy, Work};
@@ -49,9 +50,10 @@ impl Body {
             work.book(blade.segments.len() * self.space.n_elements() / SNAP_PAIRS_PER_FRAGMENT);
             return self.snap_cut(&blade, incision).map(Some);
         }
+        let before = self.outline();
         let report = self.space.go_on_cutting(&mut self.team, work);
         if let Some(report) = &report {
-            self.follow_cut(report)?;
+            self.follow_cut(report, before)?;
         }
         Ok(report)
     }
@@ -79,17 +81,19 @@ impl Body {
         if self.snap.is_some() {
             return self.snap_cut(blade, incision);
         }
+        let before = self.outline();
         let report = self.space.cut(&mut self.team, &self.state.x, blade, incision)?;
-        self.follow_cut(&report)?;
+        self.follow_cut(&report, before)?;
         Ok(report)
     }
 
     /// Brings the body up to date after a cut of pieces and copies.
-    fn follow_cut(&mut self, report: &CutReport) -> Result<(), BodyError> {
+    fn follow_cut(&mut self, report: &CutReport, before: Option<Outline>) -> Result<(), BodyError> {
         // While a cut is still on its way through an element, only the surface changes.
         if self.space.has_changed() {
             self.inherit(&report.new_copies);
             self.dynamics.follow_cut(&mut self.team, &*self.space, &report.new_copies)?;
+            self.carry_viscous(before);
             if self.space.n_added() == 0 {
                 self.follow_new_copies(&report.new_copies);
             } else {

@@ -5,7 +5,9 @@ use nalgebra::{Matrix3, Vector3};
 use super::{Body, BodyError};
 use crate::assembly::Model;
 use crate::body::estimate::{CellRecovery, CutTets, MeshError, StressRecovery};
+use crate::material::{first_piola, matrix};
 use crate::solver::multigrid::{CoarsestSolve, LevelReport};
+use crate::team::Team;
 
 /// Counts of elements so flat that one of their motions is far stiffer than the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,7 +65,7 @@ impl Body {
     /// Elastic energy [J]: Σ w ψ(F) over the quadrature points, with the remedies against locking.
     pub fn elastic_energy(&self) -> f64 {
         if let Some(model) = self.dynamics.model() {
-            return model.energy(&self.state.x);
+            return model.energy_with(&self.state.x, &self.state.viscous);
         }
         self.space.energy(&self.material, &self.state.x)
     }
@@ -88,12 +90,18 @@ impl Body {
     pub fn cauchy_stresses(&self) -> Vec<Matrix3<f64>> {
         let law = self.material.law;
         let mut of_element: Vec<(Matrix3<f64>, f64)> = Vec::new();
+        let prony = &self.settings.prony;
+        let mut springs = self.state.viscous.chunks_exact(prony.len().max(1));
         self.space.for_points(&self.state.x, &mut |point| {
             of_element.resize(point.element + 1, (Matrix3::zeros(), 0.0));
+            let relaxing = springs.next();
             let J = point.F.determinant();
             if J > 1e-9 {
                 let lame = self.space.lame(point.region, &self.material);
-                let P = law.stress(&point.F, lame) + self.settings.fibres.stress(law, &point.F);
+                let mut P = law.stress(&point.F, lame) + self.settings.fibres.stress(law, &point.F);
+                if let Some(d) = relaxing {
+                    P += first_piola(law, &point.F, &(2.0 * lame.mu * matrix(&prony.sum(d))));
+                }
                 of_element[point.element].0 += point.weight * (P * point.F.transpose() / J);
             }
             of_element[point.element].1 += point.weight;
@@ -107,7 +115,9 @@ impl Body {
     /// Settings for which there is none.
     pub fn discrete_model(&self) -> Result<Model, BodyError> {
         let model = self.space.model(&self.material, self.settings.volumetric)?;
-        Ok(model.with_fibres(self.settings.fibres)?)
+        let mut model = model.with_fibres(self.settings.fibres)?.with_prony(self.settings.prony)?;
+        model.begin_relaxation(&mut Team::alone(), 0.0, &self.state.x, &self.state.viscous);
+        Ok(model)
     }
 
     /// Region of the material of every element, numbered as in [`cauchy_stresses`](Self::cauchy_stresses): 0 for the
@@ -122,9 +132,10 @@ impl Body {
     }
 
     /// Estimates the discretisation error of linear tetrahedra, cut or not; `None` for other elements and for bodies with
-    /// fibres.
+    /// fibres or viscoelasticity.
     pub fn mesh_error(&self, recovery: &mut StressRecovery) -> Option<MeshError> {
-        let tets = self.space.tets().filter(|tets| tets.is_linear() && self.settings.fibres.is_empty())?;
+        let plain = self.settings.fibres.is_empty() && self.settings.prony.is_empty();
+        let tets = self.space.tets().filter(|tets| tets.is_linear() && plain)?;
         let tets = CutTets::new(tets.mesh(), tets.pieces(), self.n_copies(), tets.regions());
         Some(recovery.estimate(&tets, &self.state.x, self.material.law, self.material.lame()))
     }

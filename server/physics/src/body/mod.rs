@@ -12,6 +12,7 @@ mod phases;
 mod precision;
 mod pressing;
 mod range;
+mod relaxing;
 mod settings;
 mod sleep;
 mod snapping;
@@ -37,6 +38,7 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 
+use crate::assembly::Model;
 use crate::assembly::pressure::Pressure;
 pub use crate::assembly::{ElementKind, Volumetric};
 pub use crate::cut::FrontRule;
@@ -250,6 +252,7 @@ impl Body {
             dynamics,
         };
         body.return_to_rest();
+        body.relax_viscous();
         body.follow_topology();
         Ok(body)
     }
@@ -300,10 +303,11 @@ impl Body {
         else {
             return;
         };
-        self.state.x.copy_from_slice(&before.x);
+        self.state.copy_from(before);
         self.state.v.fill(Vector3::zeros());
         self.spring_forces.fill(Vector3::zeros());
         self.dynamics.restart();
+        self.dynamics.follow_viscous(&mut self.team, &self.state);
         report.outcome = Outcome::Held;
         report.notice = Some(Notice::OutOfRange { stretch, size_m });
     }
@@ -466,6 +470,7 @@ impl Body {
         }
         self.state.x.copy_from_slice(x);
         self.state.v.copy_from_slice(v);
+        self.dynamics.follow_viscous(&mut self.team, &self.state);
         Ok(())
     }
 
@@ -495,6 +500,7 @@ impl Body {
         self.boundary.forget_refinement(self.space.n_nodes());
         self.return_to_rest();
         self.dynamics.rebuild(&*self.space)?;
+        self.relax_viscous();
         self.follow_topology();
         Ok(())
     }
@@ -506,6 +512,13 @@ impl Body {
         self.state.v.fill(Vector3::zeros());
         resize_reserving(&mut self.state.v, self.rest.len(), Vector3::zeros());
         self.spring_forces.clear();
+    }
+
+    /// Lets all springs of a viscoelastic body relax.
+    fn relax_viscous(&mut self) {
+        let strains = self.dynamics.model().map_or(0, Model::n_strains);
+        refill(&mut self.state.viscous, std::iter::repeat_n([0.0; 6], strains));
+        self.dynamics.follow_viscous(&mut self.team, &self.state);
     }
 }
 
@@ -522,7 +535,7 @@ fn step_solver(
     };
     let Some(mut stiffness) = stiffness else {
         let dynamics = settings.dynamics(law);
-        let of_model = (settings.volumetric, settings.fibres);
+        let of_model = (settings.volumetric, settings.fibres, settings.prony);
         return Ok(Box::new(ModelSolver::of_space(space, *material, of_model, dynamics)?));
     };
     stiffness.set_choice(settings.operator(law, space.n_pieces()));

@@ -5,7 +5,7 @@ use crate::assembly::{ElementKind, Volumetric};
 use crate::cut::FrontRule;
 use crate::cut::remesh::SnapSettings;
 use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
-use crate::material::{Fibres, Law};
+use crate::material::{Fibres, Law, Prony};
 use crate::operator::OperatorChoice;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
@@ -38,6 +38,8 @@ pub struct BodySettings {
     pub cubes: bool,
     /// Families of fibres in the whole body.
     pub fibres: Fibres,
+    /// Terms of a Prony series beside the law: viscoelasticity.
+    pub prony: Prony,
     /// Integration of the volumetric energy: a remedy against locking, or none.
     pub volumetric: Volumetric,
     /// Time integration scheme; [`Scheme::Static`] for equilibria.
@@ -107,6 +109,7 @@ impl Default for BodySettings {
             element: ElementKind::Tet4,
             cubes: false,
             fibres: Fibres::default(),
+            prony: Prony::default(),
             volumetric: Volumetric::Full,
             scheme: Scheme::ImplicitEuler,
             mass: MassKind::Lumped,
@@ -140,6 +143,7 @@ impl BodySettings {
             (self.element == ElementKind::Hex8 && !self.cubes, "element hex8 without equal cubes"),
             (!matches!(law, Law::Linear | Law::Corotational), "a law that is nonlinear in the stretch"),
             (!self.fibres.is_empty(), "fibres"),
+            (!self.prony.is_empty(), "viscoelasticity"),
             (self.scheme.is_explicit(), "an explicit integrator"),
             (
                 self.scheme == Scheme::Static && law.rotates() && !self.descends(law),
@@ -170,6 +174,7 @@ impl BodySettings {
             && self.element == ElementKind::Octree
             && law == Law::Corotational
             && self.fibres.is_empty()
+            && self.prony.is_empty()
             && self.simulate_level == 0
             && !self.relaxation
     }
@@ -202,9 +207,10 @@ impl BodySettings {
         })
     }
 
-    /// Whether the material is linear in the stretch. Fibres are in the linear law only.
+    /// Whether the material is linear in the stretch. Fibres and viscoelasticity are in the linear law only.
     fn is_easy(&self, law: Law) -> bool {
-        law == Law::Linear || (law == Law::Corotational && self.fibres.is_empty())
+        let plain = self.fibres.is_empty() && self.prony.is_empty();
+        law == Law::Linear || (law == Law::Corotational && plain)
     }
 
     /// Largest number of linear solves in a step of the fast path.
@@ -333,6 +339,16 @@ impl BodySettings {
             return refused("the two-level preconditioner", self.element.name(), "mg-pcg");
         }
         self.check_level(law)?;
+        if !self.prony.is_empty() {
+            let why = [
+                (changes, "cutting that changes the mesh", "cutting method xfem"),
+                (self.scheme.is_explicit(), "an explicit integrator", "an implicit one"),
+                (self.relaxation, "relaxation", "a solver of the static integrator"),
+            ];
+            if let Some((_, with, instead)) = why.into_iter().find(|why| why.0) {
+                return refused("viscoelasticity", with, instead);
+            }
+        }
         match (self.arithmetic, self.why_general(law)) {
             (Some(Arithmetic::Single), Some(with)) => {
                 Err(BodyError::Combination { what: "single precision", with, instead: "mixed or double" })

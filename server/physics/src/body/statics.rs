@@ -41,7 +41,8 @@ impl Default for StaticSettings {
 
 impl Body {
     /// Moves the body to its static equilibrium under gravity [m/s²], loads and constraints; it is then
-    /// at rest. Residual and directions are in double precision, whatever the arithmetic of a step.
+    /// at rest, and nothing is left of the stress that relaxes. Residual and directions are in double precision, whatever
+    /// the arithmetic of a step.
     pub fn solve_static(
         &mut self,
         gravity: Vector3<f64>,
@@ -55,11 +56,14 @@ impl Body {
             // Here the pressure follows the surface on every path, so it is none of the dead loads.
             self.boundary.node_loads(&*self.space, self.rest.len(), &mut self.load);
         }
+        // In the long run nothing is left of the stress that relaxes.
+        self.relax_viscous();
         let made;
-        let model = match self.dynamics.model() {
+        let model = match self.dynamics.model().filter(|_| self.settings.prony.is_empty()) {
             Some(model) => model,
             None => {
-                made = self.space.model(&self.material, self.settings.volumetric)?;
+                let model = self.space.model(&self.material, self.settings.volumetric)?;
+                made = model.with_fibres(self.settings.fibres)?;
                 &made
             }
         };
@@ -82,6 +86,7 @@ impl Body {
         }
         let done =
             find_equilibrium(&mut newton, &mut self.team, &mut problem, &self.fixed, &mut self.state.x);
+        self.dynamics.follow_viscous(&mut self.team, &self.state);
         Ok(StaticReport {
             converged: done.stop == StopReason::Converged,
             newton_steps: done.steps,

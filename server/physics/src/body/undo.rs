@@ -60,6 +60,8 @@ impl Body {
     pub fn restore(&mut self, topology: BodyTopology) -> Result<(), BodyError> {
         let epoch = self.space.epoch() + 1;
         let before = Moving::of(self, topology.held);
+        let strains =
+            self.outline().map(|strains| strains.rooted(&self.split_from, topology.space.n_copies()));
         let BodyTopology { space, boundary, snap, x, split_from, renumbered, .. } = topology;
         let same_numbers = renumbered == self.renumbered;
         let state = match (&snap, space.tets()) {
@@ -83,6 +85,7 @@ impl Body {
         (self.state.x, self.state.v) = state;
         // Rotations and history of the cut state no longer apply: the integrator starts afresh.
         self.dynamics.rebuild(&*self.space)?;
+        self.carry_viscous(strains);
         self.spring_forces.clear();
         self.follow_topology();
         if !before.lost.contains(&true) {

@@ -132,6 +132,11 @@ impl Dynamics {
         self.solver.follow_cut(team, space)
     }
 
+    /// Follows `state`, whose strains of springs were changed from outside.
+    pub fn follow_viscous(&mut self, team: &mut Team, state: &State) {
+        self.solver.follow_viscous(team, state);
+    }
+
     /// Starts anew from `space` as it is now.
     pub fn rebuild(&mut self, space: &dyn Space) -> Result<(), ModelError> {
         self.course.multistep.forget();
@@ -199,6 +204,7 @@ impl Dynamics {
             return report;
         }
         state.copy_from(&self.course.before);
+        self.solver.follow_viscous(team, state);
         spring_forces.fill(Vector3::zeros());
         self.course.multistep.forget_energy();
         if report.outcome == Outcome::Held {
@@ -310,7 +316,7 @@ impl Dynamics {
         let kinetic_j = solver.kinetic_energy(inputs.mass, &state.v);
         let weight = |c: usize| solver.weight(c, inputs.mass[c], inputs.gravity);
         let loads_j = inputs.load_energy(&state.x, weight);
-        multistep.begin_energy(kinetic_j, loads_j, || solver.elastic_energy(team, &state.x, inputs.points))
+        multistep.begin_energy(kinetic_j, loads_j, || solver.elastic_energy(team, state, inputs.points))
     }
 
     /// Ends the energy balance of an attempt that began with `before_j`. Returns the energy [J] that it gained
@@ -328,8 +334,7 @@ impl Dynamics {
         if !multistep.judges_energy() || report.outcome != Outcome::Advanced {
             return None;
         }
-        let elastic_j =
-            report.elastic_j.unwrap_or_else(|| solver.elastic_energy(team, &state.x, inputs.points));
+        let elastic_j = report.elastic_j.unwrap_or_else(|| solver.elastic_energy(team, state, inputs.points));
         let weight = |c: usize| solver.weight(c, inputs.mass[c], inputs.gravity);
         let force = |c: usize| weight(c) + inputs.load[c];
         let exchanged: f64 = (0..state.x.len()).map(|c| force(c).dot(&(state.x[c] - before.x[c]))).sum();

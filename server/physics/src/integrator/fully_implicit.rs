@@ -83,6 +83,7 @@ impl ModelSolver {
         }
         prescribe(inputs.fixed, &mut state.x);
         team.begin(Phase::Operator);
+        self.model.begin_relaxation(team, inputs.h, &before.x, &before.viscous);
         let increment = history.increment;
         if let (true, Some(K)) = (increment.B > 0.0, &mut self.damping) {
             self.model.rotated_stiffness(&state.x, K);
@@ -99,8 +100,10 @@ impl ModelSolver {
         for ((v, x), from) in state.v.iter_mut().zip(&state.x).zip(history.x_v) {
             *v = increment.B * (x - from);
         }
+        let State { x, viscous, .. } = &mut *state;
+        self.model.end_relaxation(team, inputs.h, (&before.x, x), viscous);
         team.begin(Phase::Guards);
-        let elastic_j = self.model.energy_by(team, &state.x);
+        let elastic_j = self.model.energy_with_by(team, &state.x, &state.viscous);
         report.elastic_j = Some(elastic_j);
         if !finite(state) || !(self.mass.kinetic(&state.v) + elastic_j).is_finite() {
             report.outcome = Outcome::Held;

@@ -31,7 +31,7 @@ impl History {
 
     /// Whether `state` is what the last step left.
     pub fn continues(&self, state: &State) -> bool {
-        self.known && self.last == *state
+        self.known && self.last.x == state.x && self.last.v == state.v
     }
 
     /// Treats `copies`, which are held from now on, as if they had always rested at the positions of `state`.
@@ -67,8 +67,8 @@ impl History {
 
     /// Records a step of length `h` [s] from `before` to `after`.
     pub fn push(&mut self, before: &State, after: &State, h: f64) {
-        self.before.copy_from(before);
-        self.last.copy_from(after);
+        self.before.copy_motion_from(before);
+        self.last.copy_motion_from(after);
         self.h = h;
         self.known = true;
     }

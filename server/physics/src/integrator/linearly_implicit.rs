@@ -236,8 +236,8 @@ impl StepSolver for LinearlyImplicit {
         step.accelerate(team, &mut **stiffness, state, &inputs, acceleration);
     }
 
-    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>], points: &dyn Points) -> f64 {
-        let material = &self.material;
+    fn elastic_energy(&mut self, team: &mut Team, state: &State, points: &dyn Points) -> f64 {
+        let (material, x) = (&self.material, &state.x);
         let with = ElasticUpdate { lame: material.lame(), law: material.law, scale: 1.0 };
         self.stiffness.energy(team, &with, x).unwrap_or_else(|| points.energy(material, x))
     }

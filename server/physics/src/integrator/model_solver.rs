@@ -24,7 +24,7 @@ use super::step_solver::{SolverSettings, StepSolver};
 use crate::assembly::pressure::Follower;
 use crate::assembly::{BlockCsr, Model, ModelError, Volumetric};
 use crate::element::Points;
-use crate::material::{Fibres, Material};
+use crate::material::{Fibres, Material, Prony};
 use crate::operator::FixedCopy;
 use crate::solver::Newton;
 use crate::space::Space;
@@ -108,10 +108,10 @@ impl ModelSolver {
     pub fn of_space(
         space: &dyn Space,
         material: Material,
-        (volumetric, fibres): (Volumetric, Fibres),
+        (volumetric, fibres, prony): (Volumetric, Fibres, Prony),
         settings: DynamicsSettings,
     ) -> Result<Self, ModelError> {
-        let mut model = space.model(&material, volumetric)?.with_fibres(fibres)?;
+        let mut model = space.model(&material, volumetric)?.with_fibres(fibres)?.with_prony(prony)?;
         if let Some(sharing) = settings.mass.sharing(settings.scheme.is_explicit()) {
             model.share_mass(sharing);
         }
@@ -180,11 +180,16 @@ impl StepSolver for ModelSolver {
         acceleration: &mut [Vector3<f64>],
     ) {
         self.begin(state, inputs, &mut SolveReport::default());
+        self.follow_viscous(team, state);
         self.acceleration_at(team, [&state.x, &state.v], inputs, acceleration);
     }
 
-    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>], _: &dyn Points) -> f64 {
-        self.model.energy_by(team, x)
+    fn elastic_energy(&mut self, team: &mut Team, state: &State, _: &dyn Points) -> f64 {
+        self.model.energy_with_by(team, &state.x, &state.viscous)
+    }
+
+    fn follow_viscous(&mut self, team: &mut Team, state: &State) {
+        self.model.begin_relaxation(team, 0.0, &state.x, &state.viscous);
     }
 
     fn kinetic_energy(&self, _: &[f64], v: &[Vector3<f64>]) -> f64 {
@@ -225,6 +230,7 @@ impl StepSolver for ModelSolver {
 
     fn follow_cut(&mut self, _: &mut Team, space: &dyn Space) -> Result<(), ModelError> {
         space.follow_model(&mut self.model, &self.material);
+        self.model.resize_viscous();
         self.mass = Mass::new(&self.model, self.material.density_kg_m3, self.settings.mass);
         self.newton.forget_pattern();
         self.newton.set_stiff_modes(space.stiff_modes().map(Arc::new));
@@ -234,7 +240,7 @@ impl StepSolver for ModelSolver {
     }
 
     fn rebuild(&mut self, space: &dyn Space) -> Result<(), ModelError> {
-        let kept = (self.model.volumetric(), *self.model.fibres());
+        let kept = (self.model.volumetric(), *self.model.fibres(), *self.model.prony());
         *self = Self::of_space(space, self.material, kept, self.settings)?;
         Ok(())
     }

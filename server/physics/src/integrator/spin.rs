@@ -151,7 +151,7 @@ mod tests {
         let v = x.iter().map(|x| omega.cross(x) + Vector3::new(1.0, 2.0, 3.0)).collect();
         let parts =
             LooseParts { of_copy: [[0; 4], [1; 4]].concat(), mass: vec![4.0; 2], free: vec![true, false] };
-        (State { x, v }, vec![1.0; 8], parts)
+        (State { x, v, ..State::default() }, vec![1.0; 8], parts)
     }
 
     #[test]

@@ -2,15 +2,20 @@
 
 use nalgebra::Vector3;
 
+use crate::material::Strain;
 use crate::operator::FixedCopy;
 
-/// Positions and velocities that a body keeps from step to step, one entry per copy.
+/// What a body keeps from step to step: positions and velocities, one entry per copy, and what relaxes in a viscoelastic
+/// body.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// Positions [m].
     pub x: Vec<Vector3<f64>>,
     /// Velocities [m/s].
     pub v: Vec<Vector3<f64>>,
+    /// Strains d of the springs of a [`Prony`](crate::material::Prony) series, per element, quadrature point and term.
+    /// Empty without one.
+    pub viscous: Vec<Strain>,
 }
 
 /// A copy lighter than this [kg] has no inertia that single precision could represent.
@@ -26,6 +31,13 @@ pub(super) fn hold(fixed: &[FixedCopy], v: &mut [Vector3<f64>]) {
 impl State {
     /// Copies `other` into this state, without allocating if the lengths agree.
     pub fn copy_from(&mut self, other: &State) {
+        self.x.clone_from(&other.x);
+        self.v.clone_from(&other.v);
+        self.viscous.clone_from(&other.viscous);
+    }
+
+    /// The same without what relaxes.
+    pub fn copy_motion_from(&mut self, other: &State) {
         self.x.clone_from(&other.x);
         self.v.clone_from(&other.v);
     }

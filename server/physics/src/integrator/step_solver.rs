@@ -61,8 +61,13 @@ pub trait StepSolver: Any + Debug + Send {
         acceleration: &mut [Vector3<f64>],
     );
 
-    /// Elastic energy [J] at `x` [m] of the body with these quadrature points.
-    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>], points: &dyn Points) -> f64;
+    /// Elastic energy [J] in `state` of the body with these quadrature points.
+    fn elastic_energy(&mut self, team: &mut Team, state: &State, points: &dyn Points) -> f64;
+
+    /// Follows `state`, whose strains of springs were changed from outside.
+    fn follow_viscous(&mut self, team: &mut Team, state: &State) {
+        let _ = (team, state);
+    }
 
     /// ½ vᵀ M v [J].
     fn kinetic_energy(&self, mass: &[f64], v: &[Vector3<f64>]) -> f64 {

@@ -2,7 +2,7 @@
 //!
 //! A law consists of the energy density ψ(F) [J/m³], the first Piola–Kirchhoff stress P(F) = ∂ψ/∂F [Pa] and
 //! the tangent ∂P/∂F [Pa]. Each law has its own file, which checks the three against finite differences. A
-//! law has no state besides F.
+//! law has no state besides F. What has a past, [`Prony`] series, stands beside the law; so do families of [`Fibre`]s.
 
 #[cfg(test)]
 mod finite_difference;
@@ -15,6 +15,7 @@ mod collapse_guard;
 mod neo_hookean;
 mod law;
 mod fibres;
+mod prony;
 mod regions;
 mod split;
 #[cfg(test)]
@@ -25,6 +26,8 @@ pub use fibres::{Fibre, Fibres, MAX_FIBRES};
 pub use law::{Law, Tangent};
 pub use linear::Linear;
 pub use neo_hookean::NeoHookean;
+pub use prony::{MAX_PRONY, Prony, PronySpring, PronyTerm, Strain};
+pub(crate) use prony::{first_piola, matrix};
 pub use regions::{Regions, RegionsError};
 pub use split::Split;
 pub use st_venant_kirchhoff::StVenantKirchhoff;

@@ -50,7 +50,7 @@ impl Rig {
     fn new(model: Model, material: Material, settings: DynamicsSettings) -> Self {
         let n = model.n_nodes();
         Self {
-            state: State { x: model.rest().to_vec(), v: vec![V::zeros(); n] },
+            state: State { x: model.rest().to_vec(), v: vec![V::zeros(); n], viscous: Vec::new() },
             masses: model.lumped_mass(material.density_kg_m3),
             dynamics: Dynamics::of_model(model.clone(), material, settings).unwrap(),
             model,

@@ -36,6 +36,7 @@ mod springs;
 mod together;
 mod two_level;
 mod verdicts;
+mod viscoelastic;
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, PcgSettings};

@@ -532,12 +532,11 @@ impl Check<'_> {
                 "write element = \"tet4\" or remove the effect",
             );
         }
-        if let (Some(true), Some(body)) =
-            (raw.error_estimate, self.raw.body.iter().find(|b| !b.fibre.is_empty()))
-        {
-            let what =
-                format!("found true, but body `{}` has fibres, which the estimate does not know", body.id);
-            self.conflict("effects.error_estimate".into(), what, "remove the effect, or the fibres");
+        let unknown = |b: &&RawBody| !b.fibre.is_empty() || !b.prony.is_empty();
+        if let (Some(true), Some(body)) = (raw.error_estimate, self.raw.body.iter().find(unknown)) {
+            let (id, has) = (&body.id, if body.fibre.is_empty() { "viscoelasticity" } else { "fibres" });
+            let what = format!("found true, but body `{id}` has {has}, which the estimate does not know");
+            self.conflict("effects.error_estimate".into(), what, &format!("remove the effect, or the {has}"));
         }
         if raw.cutting_force == Some(true) && self.raw.body.iter().all(|b| b.cutting.toughness_j_m2.is_none())
         {

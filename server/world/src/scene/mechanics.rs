@@ -5,7 +5,7 @@ use scindo_physics::body::{
     OperatorChoice, PcgSettings, Scheme, Volumetric,
 };
 use scindo_physics::cut::remesh::{Moves, SnapSettings};
-use scindo_physics::material::{Fibres, Law};
+use scindo_physics::material::{Fibres, Law, Prony};
 
 use super::raw::{
     RawCutMethod, RawElement, RawFront, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod,
@@ -36,6 +36,8 @@ pub struct Mechanics {
     pub law: RawLaw,
     /// Families of fibres.
     pub fibres: Fibres,
+    /// Terms of a Prony series.
+    pub prony: Prony,
     /// Time integration.
     pub integrator: RawIntegrator,
     /// Parameters of Newmark's method, used by it alone.
@@ -142,6 +144,7 @@ impl Mechanics {
             },
             cubes: self.element == RawElement::Hex8 && self.cubes,
             fibres: self.fibres,
+            prony: self.prony,
             volumetric: match self.locking {
                 RawLocking::None => Volumetric::Full,
                 RawLocking::NodeAveraged => Volumetric::NodeAveraged { kept: KEPT },

@@ -145,6 +145,10 @@ pub struct RawBody {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 3))]
     pub fibre: Vec<RawFibre>,
+    /// Viscoelasticity: terms of a Prony series.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 3))]
+    pub prony: Vec<RawProny>,
     /// Rayleigh damping: a mass term and a stiffness term.
     #[serde(default)]
     pub rayleigh: RawRayleigh,

@@ -1,6 +1,7 @@
 //! Which elements, laws, integrators and solvers go together; everything else is refused here.
 
 use scindo_physics::body::Arithmetic;
+use scindo_physics::material::{Prony, PronyTerm};
 
 use super::super::checked::{CellSplit, MeshSource};
 use super::super::mechanics::{Mechanics, Newmark};
@@ -16,6 +17,9 @@ impl Check<'_> {
             cubes: mesh.has_cubes(),
             law: body.law,
             fibres: self.fibres(at, body),
+            prony: Prony::new(
+                body.prony.iter().map(|&RawProny { ratio, time_s }| PronyTerm { ratio, time_s }),
+            ),
             integrator: body.integrator,
             newmark: Newmark { beta: newmark.beta, gamma: newmark.gamma },
             mass: body.mass,
@@ -44,7 +48,35 @@ impl Check<'_> {
         self.solver(at, &mechanics);
         self.precision(at, &mechanics);
         self.operator(at, &mechanics);
+        self.viscoelasticity(at, &mechanics);
         mechanics
+    }
+
+    /// What a Prony series does not go with.
+    fn viscoelasticity(&mut self, at: &str, m: &Mechanics) {
+        if m.prony.is_empty() {
+            return;
+        }
+        let changes = !matches!(m.cutting, RawCutMethod::Xfem | RawCutMethod::Links);
+        let why = [
+            (changes, word(&m.cutting), "cutting that keeps the elements", "write cutting.method = \"xfem\""),
+            (
+                m.integrator.is_explicit(),
+                word(&m.integrator),
+                "an implicit integrator",
+                "write integrator = \"bdf2\"",
+            ),
+            (
+                m.method == RawMethod::Relaxation,
+                word(&m.method),
+                "another solver of the static integrator",
+                "write solver.method = \"pcg\"",
+            ),
+        ];
+        for (_, found, allowed, next) in why.into_iter().filter(|why| why.0) {
+            let what = format!("found with `{found}`, allowed: {allowed}");
+            self.conflict(format!("{at}.prony"), what, next);
+        }
     }
 
     fn cutting(&mut self, at: &str, m: &Mechanics) {
@@ -242,7 +274,7 @@ impl Check<'_> {
                 if let Some(why) = m.why_general() {
                     let what = format!("found `single` with {why}, allowed: mixed, double");
                     let next = "single precision needs tet4, octree or hex8 on equal cubes, linear or corotational, implicit-euler, bdf2 or newmark (static with the linear law, or octree), pcg, two-level-pcg or multigrid, \
-                                lumped mass, no fibres, no locking remedy and one Newton step";
+                                lumped mass, no fibres, no viscoelasticity, no locking remedy and one Newton step";
                     self.conflict(key, what, next);
                 }
             }

@@ -1,7 +1,7 @@
 //! Keys of regions of another material.
 
 use schemars::JsonSchema;
-use scindo_physics::material::{Fibres, Material};
+use scindo_physics::material::{Fibres, Material, Prony};
 use serde::{Deserialize, Serialize};
 
 use super::{RawWhere, Vec3};
@@ -66,4 +66,20 @@ pub struct RawFibre {
     #[serde(default)]
     #[schemars(range(min = *Fibres::STIFFENING.start(), max = *Fibres::STIFFENING.end()), extend("x-next" = "arteries have 1 to 100"))]
     pub stiffening: f64,
+}
+
+/// A Maxwell element beside the law: a spring and a dashpot in series, one term of a Prony series. The body then relaxes
+/// and creeps; its `young_pa` is what remains after a long time. Changes of volume stay elastic.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawProny {
+    /// Shear modulus g of the spring over that of the body: a shear that is applied suddenly meets 1 + g times the modulus
+    /// that remains.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = *Prony::RATIO.end(),
+        "x-next" = "0.5 to 3 for soft organs"))]
+    pub ratio: f64,
+    /// Relaxation time τ [s]: held stretched, the spring loses its stress as exp(−t/τ).
+    #[schemars(range(min = *Prony::TIME_S.start(), max = *Prony::TIME_S.end()),
+        extend("x-next" = "0.1 to 100 s for soft organs"))]
+    pub time_s: f64,
 }
