@@ -3,6 +3,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::*;
+use crate::cut::BladeSweep;
+use crate::team::Team;
 
 pub fn cube(cells: u32, levels: u8) -> Octree {
     let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
@@ -456,5 +458,45 @@ fn volumes_follow_cuts_and_refinement_to_the_bit() {
             hung |= octree.hanging().iter().any(|&hanging| hanging != 0);
         }
         assert!(hung, "round {round}");
+    }
+}
+
+/// Blades that cut at once cut the links that they cut one after the other, also along faces of coarse leaves, where
+/// rounding decides which half of a link a blade crosses.
+#[test]
+fn blades_at_once_cut_as_one_after_the_other() {
+    for (n, turn) in [(48, 0.0_f64), (48, 0.6), (80, 0.0)] {
+        let along = Vector3::new(turn.cos(), turn.sin(), 0.0);
+        let across = Vector3::new(-turn.sin(), turn.cos(), 0.0);
+        let blade = |place: f64, of: &Vector3<f64>, along: &Vector3<f64>| {
+            let middle = Vector3::new(0.5, 0.5, 0.0) + (place - 0.5) * of;
+            let edge = |z: f64| [-2.0, 2.0].map(|t| middle + t * along + Vector3::new(0.0, 0.0, z));
+            BladeSweep { segments: vec![edge(1.5), edge(0.5)] }
+        };
+        let places = [7.0, 13.0, 21.0, 27.0, 33.0, 41.0].map(|p| p / f64::from(n));
+        let blades: Vec<BladeSweep> = places
+            .iter()
+            .map(|&p| blade(p, &along, &across))
+            .chain(places.iter().map(|&p| blade(p, &across, &along)))
+            .collect();
+        let (mut once, mut one_by_one) = (cube(n, 4), cube(n, 4));
+        let x = once.rest_positions();
+        once.cut_along(&mut Team::alone(), &x, &blades).unwrap();
+        for (incision, blade) in (1..).zip(&blades) {
+            let x = one_by_one.rest_positions();
+            let triangles = crate::cut::sweep_triangles(None, blade, &x);
+            let cuts = one_by_one.crossed_links(&x, &triangles, incision);
+            one_by_one.cut(&cuts);
+        }
+        check_vertices(&once);
+        let keys = |octree: &Octree| -> BTreeMap<LinkKey, u32> {
+            octree.links.iter().map(|(key, cut)| (*key, cut.incision)).collect()
+        };
+        let (a, b) = (keys(&once), keys(&one_by_one));
+        assert_eq!(a, b);
+        let leaves = |octree: &Octree| {
+            octree.cells().iter().map(|cell| (cell.at, cell.level)).collect::<BTreeSet<_>>()
+        };
+        assert_eq!(leaves(&once), leaves(&one_by_one));
     }
 }
