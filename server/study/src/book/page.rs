@@ -26,6 +26,7 @@ const STYLE: &str = "<style>
 .verdict { font-weight: 600; }
 .v0 { color: var(--c2); } .v1 { color: var(--c0); } .v2 { color: var(--c3); } .v3 { color: var(--soft); } .v4 { color: var(--bad); } .v5 { color: var(--soft); font-weight: 400; }
 .filter label { margin-right: 14px; white-space: nowrap; }
+.tight td:first-child { padding-right: 16px; }
 .filter b { font-weight: 600; }
 td.wrap { white-space: normal; min-width: 22ch; }
 td.why { white-space: normal; min-width: 30ch; color: var(--soft); }

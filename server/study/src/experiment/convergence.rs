@@ -3,7 +3,7 @@
 
 use scindo_physics::solver::multigrid::Smoother;
 
-use super::model::{CUBE, Grid, Model, animal, cube};
+use super::model::{CUBE, Cuts, Grid, Model, animal, cube};
 use super::printed::RATES;
 use super::solve::{decay, rate};
 use super::system::{Problem, System, smoothers};
@@ -65,7 +65,11 @@ pub fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, 
             ..Plots::default()
         });
     }
-    let model = if bench.is_quick() { animal(None, 39, 2, true)? } else { animal(None, 77, 3, true)? };
+    let model = if bench.is_quick() {
+        animal(None, 39, 2, Cuts::Curved)?
+    } else {
+        animal(None, 77, 3, Cuts::Curved)?
+    };
     let mut charts = charts("animal");
     for problem in [Problem::Equilibrium].into_iter().chain(MASSES.map(Problem::Step)) {
         bench.begin(format!("animal, {}", problem.words()), total)?;

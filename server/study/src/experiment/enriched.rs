@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use scindo_physics::assembly::Model;
 use scindo_physics::body::{Body, BodySettings, Outcome, PcgSettings, Scheme};
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::enrichment::{EnrichedTet, Enrichment, Side, UA};
 use scindo_physics::material::{Law, Material, Rayleigh, Tangent};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
@@ -95,8 +96,31 @@ pub fn enriched(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Tro
             table.printed(format!("{name}, printed"), &values);
         }
     }
-    result.tables.push(table);
+    result.tables.extend([table, coefficients()?]);
     Ok(result)
+}
+
+/// Factors between the blocks of the stiffness of an enriched element, for functions that are enriched by
+/// ψᵢ = H(x) − H(xᵢ) with H = ±1, as the short paper has them; here they are half as large.
+fn coefficients() -> Result<Table, Trouble> {
+    let mut table = Table::new(
+        "Blocks of the stiffness of an enriched element",
+        "Linear law, a pair of nodes on one side of the cut: the block over that of the part of the element beyond the cut. \
+         ψ = (H − Hᵢ)/2 here, so an added degree of freedom counts twice in the paper's convention.",
+        &[("here", Unit::Number), ("in the paper's convention", Unit::Number)],
+    );
+    let corners = [V::zeros(), V::new(1.0, 0.1, 0.0), V::new(0.2, 0.9, 0.1), V::new(0.1, 0.2, 1.1)];
+    let sides = [Side::Left, Side::Left, Side::Right, Side::Right];
+    let above = 0.3;
+    let tet = EnrichedTet::new(&corners, MATERIAL.lame(), sides, above)?;
+    let still = UA { u: [V::zeros(); 4], a: [V::zeros(); 4] };
+    let J = tet.tangent(Enrichment::ShiftedHeaviside, Law::Linear, &still);
+    let [ua, aa] = [J.ua, J.aa].map(|block| block[0][1].norm() / (above * J.uu[0][1].norm()));
+    table.row("K^ua over K^uu", &[ua, 2.0 * ua].map(Some));
+    table.row("K^aa over K^uu", &[aa, 4.0 * aa].map(Some));
+    table.printed("K^ua over K^uu, printed", &[None, Some(2.0)]);
+    table.printed("K^aa over K^uu, printed", &[None, Some(4.0)]);
+    Ok(table)
 }
 
 /// The block, held at its left side, cut or whole.

@@ -1,12 +1,14 @@
 //! The bodies of the experiments, and the blades that cut them.
 
+use std::hint::black_box;
 use std::time::Instant;
 
 use nalgebra::{Rotation3, Vector3};
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::element::Simd;
 use scindo_physics::material::Region;
 use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace, Shape};
-use scindo_physics::space::Space;
+use scindo_physics::operator::cells::CellStiffness;
 use scindo_physics::team::Team;
 
 use super::Trouble;
@@ -65,13 +67,15 @@ pub struct Model {
     pub pull: Pull,
 }
 
-/// A body that was cut.
+/// A body that was cut by all its blades at once.
 #[derive(Debug)]
 pub struct Cut {
     /// Cells, links and surface.
     pub space: OctreeSpace,
-    /// Seconds that all cuts took, surface included.
+    /// Seconds that the paper's column *cutting* takes: links, refinement, vertices and the kernels of the cells.
     pub seconds: f64,
+    /// Seconds of volumes and surface, made anew.
+    pub surface_s: f64,
     /// Number of links that are cut.
     pub links: usize,
 }
@@ -141,17 +145,56 @@ pub fn grid_of_blades(places: &[f64], angle_deg: f64, tip: f64) -> Vec<BladeSwee
 /// Height below which an animal is held, in parts of its width.
 const HELD: f64 = 0.02;
 
-/// The animal, or another solid that stands upright along y, cut three times along curves.
+/// How an animal is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cuts {
+    /// Not at all.
+    Uncut,
+    /// Three times along curves.
+    Curved,
+    /// Along two curves that cross each other.
+    Crossed,
+    /// Along two curves apart from each other.
+    Apart,
+    /// Twice from above, a thin slice apart.
+    Slices,
+}
+
+impl Cuts {
+    /// What is appended to the name of the animal.
+    fn words(self) -> &'static str {
+        match self {
+            Self::Uncut | Self::Curved => "",
+            Self::Crossed => ", crossing cuts",
+            Self::Apart => ", two cuts",
+            Self::Slices => ", slices",
+        }
+    }
+
+    fn blades(self, [low, high]: [V; 2]) -> Vec<BladeSweep> {
+        match self {
+            Self::Uncut => Vec::new(),
+            Self::Curved => ARCS.map(|arc| curved_blade(arc, [low, high])).into(),
+            Self::Crossed => CROSSED.map(|arc| curved_blade(arc, [low, high])).into(),
+            Self::Apart => APART.map(|arc| curved_blade(arc, [low, high])).into(),
+            Self::Slices => {
+                SLICES.map(|x| curved_blade(([x, 1.05], [x, 0.8], [x, SLICED]), [low, high])).into()
+            }
+        }
+    }
+}
+
+/// The animal, or another solid that stands upright along y.
 ///
 /// # Errors
 /// A solid too thin for its cells, or more of them than a lattice may have.
-pub fn animal(solid: Option<&dyn Shape>, across: u32, levels: u8, curved: bool) -> Result<Model, Trouble> {
+pub fn animal(solid: Option<&dyn Shape>, across: u32, levels: u8, cuts: Cuts) -> Result<Model, Trouble> {
     let is_own = solid.is_none();
     let solid = solid.unwrap_or(&Animal);
     let octree = Octree::fill(solid, OctreeSettings { cells: across, levels }, &|_| 0)?;
-    let blades = if curved { curved_blades(solid.bounds()) } else { Vec::new() };
+    let blades = cuts.blades(solid.bounds());
     Ok(Model {
-        name: format!("{}, {across} across", if is_own { "Animal" } else { "Surface" }),
+        name: format!("{}, {across} across{}", if is_own { "Animal" } else { "Surface" }, cuts.words()),
         octree,
         blades,
         held: |X| X.y < HELD,
@@ -161,28 +204,37 @@ pub fn animal(solid: Option<&dyn Shape>, across: u32, levels: u8, curved: bool) 
 
 /// Three blades along z that are led into the solid on arcs, in parts of its bounds. The solid stays one
 /// part: a part that falls freely would be all of the solution.
-const ARCS: [([f64; 2], [f64; 2], [f64; 2]); 3] = [
+const ARCS: [Arc; 3] = [
     ([-0.05, 0.42], [0.25, 0.42], [0.52, 0.30]),
     ([0.56, 1.05], [0.72, 0.50], [0.58, 0.07]),
     ([0.76, 1.05], [0.90, 0.55], [0.74, 0.06]),
 ];
+/// Two of them that cross, in the middle of the solid.
+const CROSSED: [Arc; 2] =
+    [([0.25, 1.05], [0.45, 0.50], [0.60, 0.12]), ([0.75, 1.05], [0.55, 0.50], [0.40, 0.12])];
+/// Two of them apart from each other.
+const APART: [Arc; 2] =
+    [([0.56, 1.05], [0.72, 0.50], [0.58, 0.07]), ([0.30, 1.05], [0.42, 0.55], [0.30, 0.06])];
+/// Where slices are cut, and how far down.
+const SLICES: [f64; 2] = [0.45, 0.55];
+const SLICED: f64 = 0.45;
 /// Places of the blade along an arc.
 const PLACES: u32 = 16;
 
-fn curved_blades([low, high]: [V; 2]) -> Vec<BladeSweep> {
+/// Beginning, direction and end of a blade that is led on an arc, in parts of the bounds of the solid.
+type Arc = ([f64; 2], [f64; 2], [f64; 2]);
+
+fn curved_blade((a, b, c): Arc, [low, high]: [V; 2]) -> BladeSweep {
     let extent = high - low;
-    let of_arc = |(a, b, c): ([f64; 2], [f64; 2], [f64; 2])| {
-        let place = |k: u32| {
-            let t = f64::from(k) / f64::from(PLACES);
-            let w = [(1.0 - t) * (1.0 - t), 2.0 * t * (1.0 - t), t * t];
-            [-0.2, 1.2].map(|z| {
-                let in_plane = |i: usize| w[0] * a[i] + w[1] * b[i] + w[2] * c[i];
-                low + V::new(in_plane(0), in_plane(1), z).component_mul(&extent)
-            })
-        };
-        BladeSweep { segments: (0..=PLACES).map(place).collect() }
+    let place = |k: u32| {
+        let t = f64::from(k) / f64::from(PLACES);
+        let w = [(1.0 - t) * (1.0 - t), 2.0 * t * (1.0 - t), t * t];
+        [-0.2, 1.2].map(|z| {
+            let in_plane = |i: usize| w[0] * a[i] + w[1] * b[i] + w[2] * c[i];
+            low + V::new(in_plane(0), in_plane(1), z).component_mul(&extent)
+        })
     };
-    ARCS.map(of_arc).into()
+    BladeSweep { segments: (0..=PLACES).map(place).collect() }
 }
 
 impl Model {
@@ -191,13 +243,14 @@ impl Model {
     /// # Errors
     /// A cut that is refused.
     pub fn cut(&self) -> Result<Cut, Trouble> {
-        let (mut team, mut space) = (Team::alone(), OctreeSpace::new(self.octree.clone()));
+        let (mut team, mut octree, x) = (Team::alone(), self.octree.clone(), self.octree.rest_positions());
         let started = Instant::now();
-        let mut links = 0;
-        for (incision, blade) in (1..).zip(&self.blades) {
-            let x = space.rest_positions();
-            links += space.cut(&mut team, &x, blade, incision)?.faces_opened;
-        }
-        Ok(Cut { space, seconds: started.elapsed().as_secs_f64(), links })
+        let links = octree.cut_along(&mut team, &x, &self.blades)?.links;
+        let lame: Vec<_> = octree.regions().iter().map(Region::lame).collect();
+        black_box(CellStiffness::new(Simd::detect(), &octree, &lame));
+        let seconds = started.elapsed().as_secs_f64();
+        let started = Instant::now();
+        let space = OctreeSpace::new(octree);
+        Ok(Cut { space, seconds, surface_s: started.elapsed().as_secs_f64(), links })
     }
 }

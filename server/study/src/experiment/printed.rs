@@ -58,6 +58,35 @@ pub const BUNNY_3: Printed = Printed {
     gradients: [0.655, 0.172],
 };
 
+/// The armadillo.
+pub const ARMADILLO: Printed = Printed {
+    name: "Armadillo",
+    cells: [493e3, 3717e3, 643e3],
+    seconds: [2.24, 8.24, 47.2],
+    multigrid_s: 4.35,
+    reduction: 0.019,
+    gradients: [0.973, 101.0],
+};
+
+/// A picture whose caption prints cells, and seconds of cutting and step together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Picture {
+    /// Its number.
+    pub name: &'static str,
+    /// Hexahedra before the cut, if printed, and after it.
+    pub cells: [Option<f64>; 2],
+    /// Seconds of cutting and a step.
+    pub both_s: f64,
+}
+
+/// Figures 11, 13 and 15.
+pub const PICTURES: [Picture; 4] = [
+    Picture { name: "figure 11, left", cells: [Some(83e3), Some(204e3)], both_s: 3.5 },
+    Picture { name: "figure 13", cells: [Some(345e3), Some(429e3)], both_s: 7.3 },
+    Picture { name: "figure 15, middle", cells: [None, Some(166e3)], both_s: 2.6 },
+    Picture { name: "figure 15, right", cells: [None, Some(177e3)], both_s: 2.8 },
+];
+
 /// Leaves of the cube with a soft layer: before and after the cut.
 pub const LAYERED: [f64; 2] = [83e3, 321e3];
 /// Seconds of cutting and a step of the same.

@@ -1,6 +1,6 @@
 //! Adaptive against uniform cells, and the time per cell from eight thousand cells on.
 
-use super::model::{Grid, Model, animal, cube};
+use super::model::{Cuts, Grid, Model, animal, cube};
 use super::solve::{Solver, Until, run};
 use super::system::{Problem, System, smoothers};
 use super::tables::S_CUBE;
@@ -76,7 +76,7 @@ pub fn sizes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
     for &(across, levels) in bodies {
         let label = format!("{across} across, {levels} levels");
         bench.begin(format!("animal, {across} cells across"), runs)?;
-        let own = step(&animal(None, across, levels, true)?)?;
+        let own = step(&animal(None, across, levels, Cuts::Curved)?)?;
         memory.row(format!("animal, {label}"), &own.memory());
         animals.row(label, &own.times());
     }

@@ -5,12 +5,12 @@ use std::time::Instant;
 use nalgebra::Vector3;
 use scindo_physics::assembly::{Model, Tangent, Volumetric};
 use scindo_physics::operator::{LinearOperator, Padded, Preconditioner};
-use scindo_physics::solver::multigrid::{Cycle, Multigrid};
+use scindo_physics::solver::multigrid::{Cycle, Multigrid, Smoother};
 use scindo_physics::solver::{LinearSettings, LinearSolver, Method, Pcg, PcgSettings, Precision, StopReason};
 use scindo_physics::team::Team;
 
 use super::Trouble;
-use super::system::{System, norm};
+use super::system::{Seconds, System, norm};
 
 type V = Vector3<f64>;
 
@@ -70,6 +70,17 @@ impl<'a> Solver<'a> {
     pub fn of(multigrid: &'a mut Multigrid, in_gradients: bool) -> Self {
         if in_gradients { Self::Preconditioned(multigrid) } else { Self::Cycles(multigrid) }
     }
+}
+
+/// Seconds of a step as in the paper, which are those of rotations, operators of all levels and three cycles, whatever
+/// error these leave; and those of its parts.
+pub fn step_of_three(system: &mut System, smoother: Smoother, in_gradients: bool) -> (f64, Seconds) {
+    let operator_s = system.update();
+    let (mut multigrid, seconds) = system.multigrid(smoother);
+    let none = vec![V::zeros(); system.unknowns() / 3];
+    let three = Until { iterations: 3, error: -1.0, seconds: 0.0 };
+    let course = run(system, Solver::of(&mut multigrid, in_gradients), &none, three);
+    (operator_s + seconds.coarse + course.points.last().map_or(f64::NAN, |point| point.0), seconds)
 }
 
 /// ‖u − exact‖ relative to ‖exact‖, which is the error at the start, from u = 0.

@@ -1,6 +1,6 @@
 //! Figure 12: error over time of direct and iterative solvers, their initialisation included.
 
-use super::model::{CUBE, Grid, Model, animal, cube};
+use super::model::{CUBE, Cuts, Grid, Model, animal, cube};
 use super::solve::{Course, FLOOR, Solver, Until, cholesky, run};
 use super::system::{Problem, System, norm, smoothers};
 use super::tables::{S_BUNNY_2, S_BUNNY_3, S_CUBE};
@@ -60,7 +60,10 @@ pub fn solvers(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trou
             ("iterations to 1e-4", Unit::Count),
         ],
     );
-    let mut models = vec![(animal(None, 39, 2, true)?, S_BUNNY_3), (animal(None, 77, 3, true)?, S_BUNNY_2)];
+    let mut models = vec![
+        (animal(None, 39, 2, Cuts::Curved)?, S_BUNNY_3),
+        (animal(None, 77, 3, Cuts::Curved)?, S_BUNNY_2),
+    ];
     if !bench.is_quick() {
         models.push((cube(CUBE, 4, Grid::Rotated)?, S_CUBE));
     }
@@ -105,7 +108,11 @@ fn over_stiffness(bench: &mut ExperimentBench<'_>, result: &mut ExperimentResult
         ],
     );
     let mut chart = Chart::new("block-Jacobi over multigrid", "log₁₀ s", "times as long");
-    let model = if bench.is_quick() { animal(None, 39, 2, true)? } else { animal(None, 155, 4, true)? };
+    let model = if bench.is_quick() {
+        animal(None, 39, 2, Cuts::Curved)?
+    } else {
+        animal(None, 155, 4, Cuts::Curved)?
+    };
     let cut = model.cut()?;
     let mut lines = RATIOS.map(|to| Line { name: format!("to {to}"), points: Vec::new() });
     for s in STIFFNESS {

@@ -6,7 +6,7 @@ use scindo_physics::octree::Shape;
 use scindo_physics::space::Space;
 
 use super::collision;
-use super::model::{CUBE, Grid, animal, cube, layered_cube};
+use super::model::{CUBE, Cuts, Grid, animal, cube, layered_cube};
 use super::printed::{BUNNY_2, BUNNY_3, CUBE as PRINTED, LAYERED};
 use super::refine::refine;
 use super::shape::Placed;
@@ -33,8 +33,8 @@ fn cubes_have_the_printed_counts() {
 #[test]
 fn the_animal_resembles_the_bunny() {
     for (across, levels, printed) in [(77, 3, BUNNY_2), (39, 2, BUNNY_3)] {
-        let model = animal(None, across, levels, true).unwrap();
-        let uniform = animal(None, across, 0, false).unwrap().octree.cells().len();
+        let model = animal(None, across, levels, Cuts::Curved).unwrap();
+        let uniform = animal(None, across, 0, Cuts::Uncut).unwrap().octree.cells().len();
         let cut = model.cut().unwrap();
         let counts = [model.octree.cells().len(), uniform, cut.space.octree().cells().len()];
         for (count, printed) in counts.into_iter().zip(printed.cells) {
@@ -49,7 +49,7 @@ fn the_animal_resembles_the_bunny() {
 /// factorisation.
 #[test]
 fn small_systems_are_solved_as_printed() {
-    let model = animal(None, 39, 2, true).unwrap();
+    let model = animal(None, 39, 2, Cuts::Curved).unwrap();
     let cut = model.cut().unwrap();
     let mut system =
         System::new(cut.space.octree(), (model.held, model.pull), Problem::Step(S_BUNNY_3)).unwrap();

@@ -4,6 +4,7 @@
 //! # Source
 //! Jeřábková 2007, chapter 5: table 5.1, figures 5.8 and 5.9.
 
+use std::collections::BTreeSet;
 use std::num::NonZero;
 use std::path::Path;
 use std::time::Instant;
@@ -11,6 +12,7 @@ use std::time::Instant;
 use nalgebra::Vector3;
 use scindo_physics::body::Body;
 use scindo_physics::element::Simd;
+use scindo_physics::mesh::{BoxPattern, box_mesh};
 use scindo_physics::operator::{Elastic, ElasticUpdate, LinearOperator as _, OperatorChoice, Stiffness as _};
 use scindo_physics::team::Team;
 use scindo_physics::team::phase::Phase;
@@ -124,6 +126,8 @@ pub fn threads(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trou
             ("conjugate gradients", Unit::Share),
             ("rest", Unit::Share),
             ("products in them", Unit::Share),
+            ("3×3 blocks", Unit::Count),
+            ("matrix [MB]", Unit::Number),
         ],
     );
     let mut charts = [Chart::new("Run time of 5 s", "threads", "s"), Chart::new("Speed-up", "threads", "")];
@@ -140,6 +144,7 @@ pub fn threads(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trou
         model.check(&courses)?;
         let product_s = model.product_s()? * f64::from(alone.iterations);
         let rest = alone.seconds - alone.forces_s - alone.solve_s;
+        let [blocks, stored] = model.blocks();
         let [seconds, forces, gradients, products] = model.printed;
         profile.row(
             model.name,
@@ -149,11 +154,21 @@ pub fn threads(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trou
                 Some(alone.solve_s / alone.seconds),
                 Some(rest / alone.seconds),
                 Some((product_s / alone.solve_s).min(1.0)),
+                Some(blocks as f64),
+                Some(stored as f64 * BLOCK_BYTES / 1e6),
             ],
         );
         profile.printed(
             format!("{}, printed", model.name),
-            &[Some(seconds), Some(forces), Some(gradients), Some(1.0 - forces - gradients), Some(products)],
+            &[
+                Some(seconds),
+                Some(forces),
+                Some(gradients),
+                Some(1.0 - forces - gradients),
+                Some(products),
+                None,
+                None,
+            ],
         );
         result.tables.push(model.table(&courses));
         let points = |y: &dyn Fn(&Course) -> f64| courses.iter().map(|(n, c)| [*n as f64, y(c)]).collect();
@@ -193,7 +208,23 @@ fn counts(cores: usize) -> Vec<usize> {
     counts
 }
 
+/// A block of 3×3 numbers in single precision [bytes].
+const BLOCK_BYTES: f64 = 36.0;
+
 impl Model {
+    /// Non-zero 3×3 blocks of the stiffness matrix, and those of one triangle of it with the diagonal.
+    fn blocks(&self) -> [usize; 2] {
+        let mesh =
+            box_mesh(Vector3::zeros(), self.size_m.into(), self.cells, BoxPattern::Tet5 { parity: false });
+        let (mut edges, nodes) = (BTreeSet::new(), mesh.nodes.len());
+        for tet in &mesh.tets {
+            for (k, &a) in tet.iter().enumerate() {
+                edges.extend(tet[k + 1..].iter().map(|&b| (a.min(b), a.max(b))));
+            }
+        }
+        [nodes + 2 * edges.len(), nodes + edges.len()]
+    }
+
     /// The scene with these cells and the keys `solver` of the solver.
     pub(super) fn scene(&self, cells: [usize; 3], solver: &str) -> String {
         let Self { law, density_kg_m3, size_m: [x, y, z], .. } = self;

@@ -46,7 +46,7 @@ pub fn section(result: &CaseResult) -> String {
     );
     let _ = writeln!(
         out,
-        "<div class=\"pair\">\n<figure>{}<figcaption>The same points by the error of the {}. The line connects \
+        "<div class=\"pair\">\n<figure>{}<figcaption>The same points by the {}. The line connects \
         the points of the front above.</figcaption></figure>\n<figure>{}<figcaption>The same points by the error \
         of their elastic energy, with the same line.</figcaption></figure>\n</div>",
         a.html(),

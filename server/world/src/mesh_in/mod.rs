@@ -18,8 +18,8 @@ mod write;
 mod shapes;
 
 pub use cubes::{FillError, OctreeReport, fill_observed};
-pub use estimate::{CELLS, MeshEstimate, estimate, largest};
-pub(crate) use estimate::{body_bytes, memory_for_meshes, most_cells};
+pub use estimate::{CELLS, MeshEstimate, estimate, largest, memory_for_meshes};
+pub(crate) use estimate::{body_bytes, most_cells};
 pub(crate) use health::connectivity::components;
 pub use health::scale::{ScaleWarning, check_scale};
 pub use health::surface::SurfaceHealth;
