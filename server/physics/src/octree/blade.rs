@@ -8,6 +8,7 @@
 //! Dick, Georgii, Westermann 2011, §4.3.
 
 use nalgebra::{Matrix3, Vector3};
+use smallvec::SmallVec;
 
 use super::cells::Octree;
 use super::change::OctreeChange;
@@ -19,6 +20,9 @@ use crate::team::{Team, blocks};
 
 /// Leaves whose triangles are selected together.
 const RUN: usize = 64;
+
+/// A point whose distance from a triangle is below this part of another one may be on either side of it by rounding.
+const NEAR: f64 = 1e-6;
 
 /// Rounding of the corners of parts of a leaf, relative to coordinates.
 const ROUNDING: f64 = 1e-14;
@@ -152,13 +156,13 @@ impl Search<'_> {
         if level == 0 {
             return self.finest(corners, at, &near);
         }
-        let half = 1 << (level - 1);
+        let (half, points) = (1 << (level - 1), halved(corners));
         for child in 0..8 {
+            let first = (0..3).map(|k| (child >> k & 1) * THIRDS[k]).sum::<usize>();
             let part: Corners = std::array::from_fn(|c| {
-                let xi = [0, 1, 2].map(|k| 0.5 * f64::from((child >> k & 1) as u8 + (c >> k & 1) as u8));
-                interpolate(corners, xi)
+                points[first + (0..3).map(|k| (c >> k & 1) * THIRDS[k]).sum::<usize>()]
             });
-            let at = [0, 1, 2].map(|k| at[k] + half * (child >> k & 1));
+            let at = [0, 1, 2].map(|k| at[k] + half * (child >> k & 1) as i32);
             self.part(&part, at, level - 1, &near);
         }
     }
@@ -168,8 +172,20 @@ impl Search<'_> {
         let leaf = self.octree.leaf(at) as usize;
         let plain = self.octree.cells[leaf].level == 0 && self.octree.hanging[leaf] == 0;
         let centre = interpolate(corners, [0.5; 3]);
+        let sides: SmallVec<[f64; 8]> = triangles.iter().map(|triangle| triangle.side(&centre)).collect();
         for d in 0..6 {
             let (axis, up) = (d / 2, d % 2 == 1);
+            // The middle of the face as this cell sees it; both cells agree but for rounding.
+            let mut own = [0.5; 3];
+            own[axis] = f64::from(u8::from(up));
+            let own = interpolate(corners, own);
+            let ahead = |(triangle, s): (&&SweepTriangle, &f64)| {
+                let t = triangle.side(&own);
+                (*s >= 0.0) == (t >= 0.0) && t.abs() > NEAR * s.abs()
+            };
+            if triangles.iter().zip(&sides).all(ahead) {
+                continue;
+            }
             let beyond = Octree::across(at, d);
             let near = self.octree.leaf(beyond);
             if near == OUTSIDE {
@@ -182,8 +198,7 @@ impl Search<'_> {
             let mut xi = [0.5; 3];
             let lower = if up { at } else { beyond };
             let face = if same {
-                xi[axis] = f64::from(u8::from(up));
-                interpolate(corners, xi)
+                own
             } else {
                 xi[axis] = 1.0;
                 self.position(lower, xi)
@@ -231,7 +246,10 @@ fn crossing(triangle: &SweepTriangle, a: &Vector3<f64>, b: &Vector3<f64>) -> Opt
 
 /// The triangles that may pass through a box. Both cells at a face keep a triangle in it, however their corners were
 /// rounded: which half of the link it crosses is decided later.
-fn among<'a>(triangles: &[&'a SweepTriangle], [low, high]: &[Vector3<f64>; 2]) -> Vec<&'a SweepTriangle> {
+fn among<'a>(
+    triangles: &[&'a SweepTriangle],
+    [low, high]: &[Vector3<f64>; 2],
+) -> SmallVec<[&'a SweepTriangle; 8]> {
     let margin = Vector3::repeat(ROUNDING * low.amax().max(high.amax()));
     let (low, high) = (low - margin, high + margin);
     triangles.iter().filter(|t| t.overlaps(&low, &high) && t.may_cross(&low, &high)).copied().collect()
@@ -250,6 +268,28 @@ pub(super) fn swept_box(triangles: &[SweepTriangle]) -> [Vector3<f64>; 2] {
 fn bounds(points: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {
     let empty = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
     points.fold(empty, |[low, high], p| [low.inf(&p), high.sup(&p)])
+}
+
+/// Steps along the axes through 3 × 3 × 3 points.
+const THIRDS: [usize; 3] = [1, 3, 9];
+
+/// The corners of the eight halves of a cube, three along each axis: what [`interpolate`] gives there, to the bit.
+fn halved(corners: &Corners) -> [Vector3<f64>; 27] {
+    let mut points = [Vector3::zeros(); 27];
+    for (c, corner) in corners.iter().enumerate() {
+        points[(0..3).map(|k| (c >> k & 1) * 2 * THIRDS[k]).sum::<usize>()] = *corner;
+    }
+    // Along one axis after the other, each between the points that the axes before have made.
+    for k in 0..3 {
+        let step = THIRDS[k];
+        for p in 0..27 {
+            let place = [p % 3, p / 3 % 3, p / 9];
+            if place[k] == 1 && place[k + 1..].iter().all(|place| *place != 1) {
+                points[p] = points[p - step] * 0.5 + points[p + step] * 0.5;
+            }
+        }
+    }
+    points
 }
 
 fn interpolate(corners: &Corners, xi: [f64; 3]) -> Vector3<f64> {
