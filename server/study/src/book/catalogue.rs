@@ -73,6 +73,8 @@ pub struct Number {
     pub open: Option<String>,
     /// Why it cannot be right.
     pub refuted: Option<String>,
+    /// Why the measured value is worse, where it is.
+    pub because: Option<String>,
 }
 
 fn one() -> f64 {
@@ -108,12 +110,6 @@ impl Number {
             [part, ..] => Some(format!("scindo accuracy {part}{}", if quick { " --quick" } else { "" })),
             [] => None,
         }
-    }
-
-    /// Why there is no judgement by the values alone.
-    pub fn reason(&self, measured: bool) -> Option<&str> {
-        let open = self.open.as_deref().filter(|_| !measured);
-        self.refuted.as_deref().or(open)
     }
 
     /// The value that has to be reached on this machine: a time of the same scalar code on a core of today, where

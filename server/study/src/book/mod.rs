@@ -25,7 +25,7 @@ use crate::bench::store::Origin;
 use catalogue::{Paper, papers};
 use measured::Measured;
 use part::Part;
-use verdict::{Verdict, judge};
+use verdict::{Verdict, judge, reason};
 
 /// Why a book could not be written.
 #[derive(Debug, Error)]
@@ -110,14 +110,15 @@ fn tally(paper: &Paper, measured: &Measured, quick: bool) -> Tally {
 fn rows(paper: &Paper, measured: &Measured, quick: bool) -> Value {
     let row = |number: &catalogue::Number| {
         let ours = measured.of(number, quick);
+        let verdict = judge(paper, number, ours);
         json!({
             "place": number.place,
             "what": number.what,
             "printed": number.printed,
             "ours": ours,
             "ratio": ours.filter(|_| number.printed != 0.0).map(|ours| ours / number.printed),
-            "verdict": judge(paper, number, ours).name(),
-            "reason": number.reason(ours.is_some()),
+            "verdict": verdict.name(),
+            "reason": reason(number, verdict),
         })
     };
     json!({ "id": paper.id, "machine": paper.machine, "rows": paper.number.iter().map(row).collect::<Vec<_>>() })

@@ -9,7 +9,7 @@ use super::Tally;
 use super::catalogue::{Number, Paper};
 use super::measured::Measured;
 use super::part::{Kind, Part};
-use super::verdict::{Verdict, judge};
+use super::verdict::{Verdict, judge, reason};
 use crate::bench::store::Origin;
 use crate::experiment::Unit;
 use crate::page::html::{escape, prose, time};
@@ -112,7 +112,7 @@ fn row(paper: &Paper, number: &Number, ours: Option<f64>, quick: bool) -> String
     let bar = number.bar(paper);
     let equal = if bar == number.printed { String::new() } else { ratio(bar) };
     let missing = "not part of this form, or not run";
-    let why = number.reason(ours.is_some()).or(Some(missing).filter(|_| ours.is_none())).unwrap_or_default();
+    let why = reason(number, verdict).or(Some(missing).filter(|_| ours.is_none())).unwrap_or_default();
     let mut out = format!(
         "<tr data-verdict=\"{}\"><td>{}</td><td class=\"wrap\">{}</td><td class=\"number\">{}</td>\
          <td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">{equal}</td>\

@@ -60,3 +60,10 @@ pub fn judge(paper: &Paper, number: &Number, ours: Option<f64>) -> Verdict {
     };
     if verdict == Verdict::Worse && refuted { Verdict::Refuted } else { verdict }
 }
+
+/// The reason for a verdict that the values do not give by themselves.
+pub fn reason(number: &Number, verdict: Verdict) -> Option<&str> {
+    let open = number.open.as_deref().filter(|_| verdict == Verdict::NotYet);
+    let because = number.because.as_deref().filter(|_| verdict == Verdict::Worse);
+    number.refuted.as_deref().or(open).or(because)
+}
