@@ -67,7 +67,7 @@ pub struct Run {
 impl Run {
     pub fn new(model: Model, material: Material, settings: DynamicsSettings) -> Self {
         let n = model.n_nodes();
-        let state = State { x: model.rest().to_vec(), v: vec![V::zeros(); n] };
+        let state = State { x: model.rest().to_vec(), v: vec![V::zeros(); n], viscous: Vec::new() };
         Self {
             masses: model.lumped_mass(material.density_kg_m3),
             density_kg_m3: material.density_kg_m3,
@@ -148,7 +148,7 @@ impl Run {
 
     /// About the origin, with lumped masses.
     pub fn angular_momentum(&self) -> V {
-        let State { x, v } = &self.state;
+        let State { x, v, .. } = &self.state;
         self.masses.iter().zip(x).zip(v).map(|((m, x), v)| *m * x.cross(v)).sum()
     }
 }
