@@ -27,18 +27,20 @@ enum Elements {
     /// Tetrahedron and copies of every piece.
     Pieces(Vec<PieceKey>),
     Cells(Vec<Cell>),
+    /// Elements that nothing changes.
+    Fixed,
 }
 
 type PieceKey = (u32, [u32; 4]);
 
 impl Elements {
     fn of(space: &dyn Space) -> Self {
-        match (space.octree(), space.tets()) {
+        match (space.octree(), space.tets().filter(|_| space.can_be_cut())) {
             (Some(octree), _) => Self::Cells(octree.octree().cells().to_vec()),
             (None, Some(tets)) => {
                 Self::Pieces(tets.pieces().iter().map(|piece| (piece.element, piece.copies)).collect())
             }
-            (None, None) => Self::Pieces(Vec::new()),
+            (None, None) => Self::Fixed,
         }
     }
 }
@@ -129,6 +131,7 @@ impl Body {
                 let per_cell = strains.len() / now.len().max(1);
                 carry_cells((&before, known), &now, (per_cell, terms), &mut strains);
             }
+            _ if strains.len() == before.strains.len() => strains.copy_from_slice(&before.strains),
             _ => {}
         }
         self.state.viscous = strains;

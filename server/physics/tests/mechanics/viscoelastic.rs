@@ -235,6 +235,21 @@ fn cuts_and_undoing_them_leave_the_springs_as_they_are() {
     }
 }
 
+/// A world undoes cuts of all its bodies at once.
+#[test]
+fn undoing_nothing_leaves_hexahedra_as_they_are() {
+    let with = BodySettings { element: ElementKind::Hex8, ..settings(Scheme::ImplicitEuler) };
+    let mut body = cube(Law::Corotational, with).unwrap();
+    sag(&mut body);
+    for _ in 0..4 {
+        body.step(0.01, DOWN, &[]);
+    }
+    let (energy, topology) = (body.elastic_energy(), body.topology());
+    body.restore(topology).unwrap();
+    assert!((body.elastic_energy() / energy - 1.0).abs() < 1e-12);
+    assert_eq!(body.step(0.01, DOWN, &[]).outcome, Outcome::Advanced);
+}
+
 /// In uniaxial tension no plane along it carries any traction: cut there, a bar relaxes as a whole one does. The cut passes
 /// through nodes, so that the ends of both halves are held as before.
 #[test]
