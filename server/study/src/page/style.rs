@@ -84,6 +84,7 @@ th { text-align: left; font-weight: 600; color: var(--soft); border-bottom: 1px 
 td { border-bottom: 1px solid var(--faint); padding: 6px 12px 6px 0; vertical-align: top; white-space: nowrap; }
 table.tight { font-size: 13.5px; }
 table.tight th, table.tight td { padding-right: 7px; }
+table.tight th { white-space: normal; }
 td.reason { white-space: normal; min-width: 34ch; color: var(--bad); }
 .number { text-align: right; }
 th.number, td.number { padding-left: 4px; }
