@@ -156,13 +156,13 @@ impl Search<'_> {
         if level == 0 {
             return self.finest(corners, at, &near);
         }
-        let (half, points) = (1 << (level - 1), halved(corners));
+        let half = 1 << (level - 1);
         for child in 0..8 {
-            let first = (0..3).map(|k| (child >> k & 1) * THIRDS[k]).sum::<usize>();
             let part: Corners = std::array::from_fn(|c| {
-                points[first + (0..3).map(|k| (c >> k & 1) * THIRDS[k]).sum::<usize>()]
+                let xi = [0, 1, 2].map(|k| 0.5 * f64::from((child >> k & 1) as u8 + (c >> k & 1) as u8));
+                interpolate(corners, xi)
             });
-            let at = [0, 1, 2].map(|k| at[k] + half * (child >> k & 1) as i32);
+            let at = [0, 1, 2].map(|k| at[k] + half * (child >> k & 1));
             self.part(&part, at, level - 1, &near);
         }
     }
@@ -175,7 +175,7 @@ impl Search<'_> {
         let sides: SmallVec<[f64; 8]> = triangles.iter().map(|triangle| triangle.side(&centre)).collect();
         for d in 0..6 {
             let (axis, up) = (d / 2, d % 2 == 1);
-            // The middle of the face as this cell sees it; both cells agree but for rounding.
+            // The middle of the face as this cell sees it. Cells that hang together agree on it but for rounding.
             let mut own = [0.5; 3];
             own[axis] = f64::from(u8::from(up));
             let own = interpolate(corners, own);
@@ -195,11 +195,11 @@ impl Search<'_> {
             // finest cells without hanging corners have the same one, to the bit.
             let near = near as usize;
             let same = plain && self.octree.cells[near].level == 0 && self.octree.hanging[near] == 0;
-            let mut xi = [0.5; 3];
             let lower = if up { at } else { beyond };
             let face = if same {
                 own
             } else {
+                let mut xi = [0.5; 3];
                 xi[axis] = 1.0;
                 self.position(lower, xi)
             };
@@ -268,28 +268,6 @@ pub(super) fn swept_box(triangles: &[SweepTriangle]) -> [Vector3<f64>; 2] {
 fn bounds(points: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {
     let empty = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
     points.fold(empty, |[low, high], p| [low.inf(&p), high.sup(&p)])
-}
-
-/// Steps along the axes through 3 × 3 × 3 points.
-const THIRDS: [usize; 3] = [1, 3, 9];
-
-/// The corners of the eight halves of a cube, three along each axis: what [`interpolate`] gives there, to the bit.
-fn halved(corners: &Corners) -> [Vector3<f64>; 27] {
-    let mut points = [Vector3::zeros(); 27];
-    for (c, corner) in corners.iter().enumerate() {
-        points[(0..3).map(|k| (c >> k & 1) * 2 * THIRDS[k]).sum::<usize>()] = *corner;
-    }
-    // Along one axis after the other, each between the points that the axes before have made.
-    for k in 0..3 {
-        let step = THIRDS[k];
-        for p in 0..27 {
-            let place = [p % 3, p / 3 % 3, p / 9];
-            if place[k] == 1 && place[k + 1..].iter().all(|place| *place != 1) {
-                points[p] = points[p - step] * 0.5 + points[p + step] * 0.5;
-            }
-        }
-    }
-    points
 }
 
 fn interpolate(corners: &Corners, xi: [f64; 3]) -> Vector3<f64> {
