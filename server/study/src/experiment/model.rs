@@ -243,10 +243,10 @@ impl Model {
     /// # Errors
     /// A cut that is refused.
     pub fn cut(&self) -> Result<Cut, Trouble> {
-        let first = self.cut_once()?;
+        // The first body goes before the second is made: each may take gigabytes.
+        let Cut { seconds, surface_s, .. } = self.cut_once()?;
         let again = self.cut_once()?;
-        let seconds = first.seconds.min(again.seconds);
-        Ok(Cut { seconds, surface_s: first.surface_s.min(again.surface_s), ..again })
+        Ok(Cut { seconds: again.seconds.min(seconds), surface_s: again.surface_s.min(surface_s), ..again })
     }
 
     fn cut_once(&self) -> Result<Cut, Trouble> {
