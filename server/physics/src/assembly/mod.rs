@@ -31,7 +31,7 @@ mod mass;
 mod mass_matrix;
 mod rotated;
 mod viscous;
-mod relaxing;
+mod viscoelastic;
 
 pub use crate::material::Tangent;
 pub use block_csr::BlockCsr;

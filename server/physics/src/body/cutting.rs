@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::relaxing::Outline;
 use super::snapping::FaceCut;
+use super::viscoelastic::Outline;
 use super::{Body, BodyError};
 use crate::cut::{BladeSweep, CutError, CutReport, NewCopy, Work};
 use crate::integrator::LooseParts;

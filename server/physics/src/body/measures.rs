@@ -116,7 +116,7 @@ impl Body {
     pub fn discrete_model(&self) -> Result<Model, BodyError> {
         let model = self.space.model(&self.material, self.settings.volumetric)?;
         let mut model = model.with_fibres(self.settings.fibres)?.with_prony(self.settings.prony)?;
-        model.begin_relaxation(&mut Team::alone(), 0.0, &self.state.x, &self.state.viscous);
+        model.begin_viscous(&mut Team::alone(), 0.0, &self.state.x, &self.state.viscous);
         Ok(model)
     }
 

@@ -12,7 +12,6 @@ mod phases;
 mod precision;
 mod pressing;
 mod range;
-mod relaxing;
 mod settings;
 mod sleep;
 mod snapping;
@@ -20,6 +19,7 @@ mod statics;
 mod together;
 mod topology;
 mod undo;
+mod viscoelastic;
 
 #[doc(hidden)]
 pub use ablation::Ablation;

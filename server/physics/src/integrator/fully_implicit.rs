@@ -83,7 +83,7 @@ impl ModelSolver {
         }
         prescribe(inputs.fixed, &mut state.x);
         team.begin(Phase::Operator);
-        self.model.begin_relaxation(team, inputs.h, &before.x, &before.viscous);
+        self.model.begin_viscous(team, inputs.h, &before.x, &before.viscous);
         let increment = history.increment;
         if let (true, Some(K)) = (increment.B > 0.0, &mut self.damping) {
             self.model.rotated_stiffness(&state.x, K);
@@ -101,7 +101,7 @@ impl ModelSolver {
             *v = increment.B * (x - from);
         }
         let State { x, viscous, .. } = &mut *state;
-        self.model.end_relaxation(team, inputs.h, (&before.x, x), viscous);
+        self.model.end_viscous(team, inputs.h, (&before.x, x), viscous);
         team.begin(Phase::Guards);
         let elastic_j = self.model.energy_with_by(team, &state.x, &state.viscous);
         report.elastic_j = Some(elastic_j);

@@ -189,7 +189,7 @@ impl StepSolver for ModelSolver {
     }
 
     fn follow_viscous(&mut self, team: &mut Team, state: &State) {
-        self.model.begin_relaxation(team, 0.0, &state.x, &state.viscous);
+        self.model.begin_viscous(team, 0.0, &state.x, &state.viscous);
     }
 
     fn kinetic_energy(&self, _: &[f64], v: &[Vector3<f64>]) -> f64 {

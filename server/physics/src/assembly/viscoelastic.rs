@@ -1,8 +1,8 @@
 //! Viscoelasticity of a model.
 //!
 //! The strains dᵢ of the springs belong to the state of the body: per element and quadrature point one for every term.
-//! A step [begins](Model::begin_relaxation) with what is left of them at its end, acts as one spring per point, and
-//! [ends](Model::end_relaxation) with their new values. See [`Prony`].
+//! A step [begins](Model::begin_viscous) with what is left of them at its end, acts as one spring per point, and
+//! [ends](Model::end_viscous) with their new values. See [`Prony`].
 
 use nalgebra::Vector3;
 
@@ -44,8 +44,8 @@ impl Model {
     }
 
     /// Begins a step of `h` [s] from the positions `x` [m] with the strains `d` of the springs. With h = 0 forces at `x`
-    /// are those of the springs as they are.
-    pub fn begin_relaxation(&mut self, team: &mut Team, h: f64, x: &[Vector3<f64>], d: &[Strain]) {
+    /// are those of the springs as they are. Another number of strains is ignored: the springs then stay at rest.
+    pub fn begin_viscous(&mut self, team: &mut Team, h: f64, x: &[Vector3<f64>], d: &[Strain]) {
         let terms = self.viscous.prony.len();
         if terms == 0 || d.len() != self.n_strains() {
             return;
@@ -62,7 +62,7 @@ impl Model {
     }
 
     /// Ends a step of `h` [s] from the positions `before` to `after` [m]: moves the strains `d` of the springs on.
-    pub fn end_relaxation(
+    pub fn end_viscous(
         &self,
         team: &mut Team,
         h: f64,
