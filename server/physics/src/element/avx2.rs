@@ -91,6 +91,25 @@ impl Vector8 for Register {
     }
 
     #[inline(always)]
+    fn transposed([a, b, c, d, e, f, g, h]: [Self; 8]) -> [Self; 8] {
+        // SAFETY: only reached from functions that enable AVX2.
+        unsafe {
+            let [a, b, c, d] = quarters([a.0, b.0, c.0, d.0]);
+            let [e, f, g, h] = quarters([e.0, f.0, g.0, h.0]);
+            [
+                Self(_mm256_permute2f128_ps::<0x20>(a, e)),
+                Self(_mm256_permute2f128_ps::<0x20>(b, f)),
+                Self(_mm256_permute2f128_ps::<0x20>(c, g)),
+                Self(_mm256_permute2f128_ps::<0x20>(d, h)),
+                Self(_mm256_permute2f128_ps::<0x31>(a, e)),
+                Self(_mm256_permute2f128_ps::<0x31>(b, f)),
+                Self(_mm256_permute2f128_ps::<0x31>(c, g)),
+                Self(_mm256_permute2f128_ps::<0x31>(d, h)),
+            ]
+        }
+    }
+
+    #[inline(always)]
     fn prefetch<T>(value: &T) {
         for line in 0..size_of::<T>().div_ceil(64) {
             // SAFETY: a hint, within the value.
@@ -209,6 +228,22 @@ unsafe fn columns([r04, r15, r26, r37]: [__m256; 4]) -> [Register; 3] {
     }
 }
 
+/// Transposes each half of four rows: of row k, entries k and k + 4 of all four.
+#[inline(always)]
+unsafe fn quarters([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
+    // SAFETY: only reached from functions that enable AVX2.
+    unsafe {
+        let (low_ab, high_ab) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+        let (low_cd, high_cd) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+        [
+            _mm256_shuffle_ps::<0x44>(low_ab, low_cd),
+            _mm256_shuffle_ps::<0xEE>(low_ab, low_cd),
+            _mm256_shuffle_ps::<0x44>(high_ab, high_cd),
+            _mm256_shuffle_ps::<0xEE>(high_ab, high_cd),
+        ]
+    }
+}
+
 /// Transposes three columns into pairs of rows (x, y, z, 0): (0 | 4), (1 | 5), (2 | 6), (3 | 7).
 #[inline(always)]
 unsafe fn rows(x: __m256, y: __m256, z: __m256) -> [__m256; 4] {
@@ -246,7 +281,9 @@ mod tests {
             V::scatter(&mut f, &ids[1], [a, b, c]);
             V::scatter_blocks(&mut blocks, &ids[1], [a, b, c, c, b, a]);
         }
-        let lanes = [a, b, c, e[0], e[1], e[2], value].into_iter().map(V::store).collect();
+        let lanes = [a, b, c, e[0], e[1], e[2], value].into_iter();
+        let lanes =
+            lanes.chain(V::transposed([a, b, c, e[0], e[1], e[2], value, a + b])).map(V::store).collect();
         let mask = vec![a.above(4.5), V::splat(f32::NAN).above(0.0)];
         (lanes, mask, f.iter().flatten().chain(blocks.iter().flatten()).copied().collect())
     }

@@ -87,6 +87,9 @@ pub trait Vector8:
     /// One bit per lane, lane 0 lowest: set if the lane is above `threshold`. It is not set for NaN.
     fn above(self, threshold: f32) -> u8;
 
+    /// The transpose of eight rows.
+    fn transposed(rows: [Self; 8]) -> [Self; 8];
+
     /// Asks for a value that is read soon, where the machine can.
     #[inline(always)]
     fn prefetch<T>(_: &T) {}
@@ -153,6 +156,17 @@ impl Vector8 for Lanes {
     #[inline(always)]
     fn above(self, threshold: f32) -> u8 {
         (0..LANES).fold(0, |bits, lane| bits | u8::from(self.0[lane] > threshold) << lane)
+    }
+
+    #[inline(always)]
+    fn transposed(rows: [Self; 8]) -> [Self; 8] {
+        let mut out = rows;
+        for i in 0..LANES {
+            for j in 0..LANES {
+                out[j].0[i] = rows[i].0[j];
+            }
+        }
+        out
     }
 
     #[inline(always)]
@@ -227,3 +241,19 @@ impl Neg for Lanes {
         Self(self.0.map(|v| -v))
     }
 }
+
+/// Repeats a block for the numbers 0 … 7. The compiler leaves a loop with so long a body rolled, and then keeps
+/// all corners in memory to index them.
+macro_rules! for_eight {
+    ($k:ident => $body:block) => {
+        for_eight!($k => $body, 0 1 2 3 4 5 6 7)
+    };
+    ($k:ident => $body:block, $($number:literal)*) => {
+        $({
+            let $k: usize = $number;
+            $body
+        })*
+    };
+}
+
+pub(crate) use for_eight;

@@ -15,6 +15,7 @@ mod spring;
 mod points;
 mod material_point;
 
+pub(crate) use lanes::for_eight;
 pub use lanes::{Ids, LANES, Lanes, Simd, Vector8};
 pub use material_point::{MOST_CARRIERS, MaterialPoint};
 pub use points::{Point, Points};

@@ -4,7 +4,7 @@
 
 use super::super::Padded;
 use super::sectors::SectorTable;
-use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8};
+use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8, for_eight};
 
 /// Eight cells with one table.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
@@ -112,22 +112,6 @@ fn prefetch<V: Vector8, T>(entries: &[T], at: usize) {
         V::prefetch(entry);
     }
 }
-
-/// Repeats a block for the numbers 0 … 7. The compiler leaves a loop with so long a body rolled, and then keeps
-/// all corners in memory to index them.
-macro_rules! for_eight {
-    ($k:ident => $body:block) => {
-        for_eight!($k => $body, 0 1 2 3 4 5 6 7)
-    };
-    ($k:ident => $body:block, $($number:literal)*) => {
-        $({
-            let $k: usize = $number;
-            $body
-        })*
-    };
-}
-
-pub(super) use for_eight;
 
 // Loops instead of closures below: see `Vector8`.
 

@@ -24,9 +24,9 @@ mod stiffness;
 
 pub use lane::{CellLane, CellMatrix, slot_corners, slot_hanging};
 pub use operator::{CellOperator, morton_order};
-pub use sectors::{Matrix24, SectorTable, unit_stiffness};
+pub use sectors::{ENTRY, Matrix24, SectorTable, unit_stiffness};
 pub use stiffness::CellStiffness;
-pub use stored::STORED;
+pub use stored::{STORED, stored_entry};
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

@@ -8,12 +8,12 @@ use smallvec::SmallVec;
 use super::super::chunks::NO_PIECE;
 use super::super::{Padded, padded};
 use super::batch::{
-    Corners, HangingWeights, SectorBatch, TableLanes, distribute, for_eight, from_cell, interpolate,
-    multiply_sectors, scatter, to_cell, transform,
+    Corners, HangingWeights, SectorBatch, TableLanes, distribute, from_cell, interpolate, multiply_sectors,
+    scatter, to_cell, transform,
 };
 use super::chunk::{BatchLanes, CellChunk, Table};
 use super::lane::{CellMatrix, handedness};
-use crate::element::{LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
+use crate::element::{LANES, Lanes, Mat3, Simd, Vector8, for_eight, polar_newton, polar_rotation};
 use crate::octree::{At, Lattice};
 
 /// What only an update needs of a chunk.

@@ -4,6 +4,7 @@ use super::dense::Dense;
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE, place_in, trilinear};
 use super::table::Weights;
+use crate::element::Lanes;
 use crate::octree::Cell;
 
 /// Places in a parent, and combinations of hanging corners.
@@ -48,7 +49,7 @@ impl Carried {
             let number = &mut self.number[slot(kind, &fine.cells[id], fine.hanging[id])];
             if *number == NONE {
                 *number = self.matrices.len() as u32;
-                self.matrices.push(matrix(l, id).carried(&corners_in(fine, id, parent)));
+                self.matrices.push(matrix(l, id).carried::<Lanes>(&corners_in(fine, id, parent)));
             }
         }
     }

@@ -6,6 +6,7 @@ use super::galerkin::Galerkin;
 use super::hierarchy::{COARSE_ENOUGH, Hierarchy};
 use super::stiff_springs::Columns;
 use crate::assembly::BlockCsr;
+use crate::element::Lanes;
 use crate::operator::Padded;
 use crate::solver::{Cholesky, Filter};
 
@@ -100,11 +101,11 @@ impl Coarsest {
         self.matrix.clear();
         for (id, places) in self.places.iter().enumerate() {
             let R = frames[id].to_rotation_matrix().into_inner();
-            let A = galerkin.cell_matrix(hierarchy, last, id).rotated(&R);
+            let A = galerkin.cell_matrix(hierarchy, last, id).rotated::<Lanes>(&R);
             for (i, &at) in places.iter().enumerate() {
                 let block = &mut self.matrix.blocks[at as usize];
                 for (e, entry) in block.iter_mut().enumerate() {
-                    *entry += f64::from(A.0[3 * (i % 8) + e % 3][3 * (i / 8) + e / 3]);
+                    *entry += f64::from(A.entry(3 * (i / 8) + e / 3, 3 * (i % 8) + e % 3));
                 }
             }
         }

@@ -9,13 +9,28 @@ use super::level::Level;
 use super::matrices::{CellMatrix, LevelMatrices};
 use crate::element::Simd;
 use crate::operator::cells::{
-    CellLane, CellMatrix as LaneMatrix, CellOperator, SectorTable, morton_order, slot_corners, slot_hanging,
+    CellLane, CellMatrix as LaneMatrix, CellOperator, STORED, SectorTable, morton_order, slot_corners,
+    slot_hanging, stored_entry,
 };
 use crate::operator::{BLOCK, Inverse3, Padded, block_of, invert, rows};
 use crate::team::{Team, blocks};
 
 /// Places of xx, yy, zz in a block.
 const DIAGONAL: [usize; 3] = [0, 4, 6];
+
+/// Places in a packed matrix of the entries of the upper triangle, row by row.
+const PLACES: [u16; STORED] = {
+    let (mut places, mut r) = ([0; STORED], 0);
+    while r < 24 {
+        let mut s = r;
+        while s < 24 {
+            places[stored_entry(r, s)] = at(r, s) as u16;
+            s += 1;
+        }
+        r += 1;
+    }
+    places
+};
 
 /// The cells of a level, arranged for the kernels by the first update.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -117,18 +132,13 @@ impl LevelKernel {
         operator.set_stored_rotations(team, rotation);
         let (moved, fresh) = (&*moved, std::mem::take(fresh));
         operator.set_stored(team, |id, entries| {
-            let (id, mut entry) = (id as usize, 0);
+            let id = id as usize;
             let CellMatrix::Stored(place) = matrices.matrix[id] else { return false };
             if !(fresh || moved[id] || matrices.changed[id]) {
                 return false;
             }
             let packed = &matrices.stored[place as usize].matrix;
-            for r in 0..24 {
-                for s in r..24 {
-                    entries[entry] = packed[at(r, s)];
-                    entry += 1;
-                }
-            }
+            entries.iter_mut().zip(PLACES).for_each(|(entry, at)| *entry = packed[usize::from(at)]);
             true
         });
     }

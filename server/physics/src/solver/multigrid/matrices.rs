@@ -7,6 +7,7 @@ use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
 use super::table::Weights;
 use super::thin::{Inner, Passed};
+use crate::element::Lanes;
 use crate::octree::{Cell, corner_weights};
 
 /// Rotations that differ by less [rad] are the same; single precision tells them apart no better.
@@ -110,7 +111,7 @@ pub(super) fn shared_matrix(level: &Level, id: usize, of_kind: &Dense, eighth: f
         return A;
     }
     let W = weights(&level.cells[id], level.hanging[id]);
-    A = A.carried(&W);
+    A = A.carried::<Lanes>(&W);
     for row in W {
         row.iter().enumerate().for_each(|(c, w)| A.add_mass(c, w * eighth));
     }

@@ -134,11 +134,7 @@ impl LevelOperator<'_> {
         let u = into_frame(&R, &self.level.vertices[id].map(|v| x[v as usize]));
         let f = match self.matrices.matrix[id] {
             CellMatrix::Stored(place) => rows_packed(&self.matrices.stored[place as usize].matrix, c, &u),
-            // Symmetric: a row is a column.
-            CellMatrix::Shared(kind) => {
-                let columns = &self.shared[kind as usize].0;
-                [0, 1, 2].map(|k| columns[3 * c + k].iter().zip(&u).map(|(a, u)| a * u).sum())
-            }
+            CellMatrix::Shared(kind) => self.shared[kind as usize].times_at(c, &u),
         };
         (R * Vector3::from(f)).into()
     }
@@ -167,7 +163,7 @@ impl LevelOperator<'_> {
             let block = match self.matrices.matrix[id] {
                 CellMatrix::Stored(place) => {
                     let A = &self.matrices.stored[place as usize].matrix;
-                    Matrix3::from_fn(|i, j| A[super::dense::at(3 * c + i.min(j), 3 * c + i.max(j))])
+                    Matrix3::from_fn(|i, j| A[super::dense::at(3 * c + i, 3 * c + j)])
                 }
                 CellMatrix::Shared(kind) => {
                     let A = &self.shared[kind as usize];

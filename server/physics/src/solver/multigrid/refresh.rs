@@ -8,7 +8,7 @@ use super::hierarchy::Hierarchy;
 use super::level::NONE;
 use super::matrices::{CellMatrix, INCLINED, LevelMatrices, Rotation, SAME, Stored, cell_matrix, weights};
 use super::thin::{Equations, Thin, is_thin};
-use crate::element::Simd;
+use crate::element::{Lanes, Simd, Vector8};
 use crate::operator::Held;
 
 /// What the matrices of level `l` are computed from.
@@ -33,20 +33,20 @@ impl Context<'_> {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
             Simd::Avx2 => unsafe { avx2::refresh(self, stored, frame, with) },
-            _ => self.refresh_all(stored, frame, with),
+            _ => self.refresh_all::<Lanes>(stored, frame, with),
         }
     }
 
     #[inline(always)]
-    fn refresh_all(&self, stored: &mut [Stored], frame: &[Rotation], with: (f32, bool)) {
+    fn refresh_all<V: Vector8>(&self, stored: &mut [Stored], frame: &[Rotation], with: (f32, bool)) {
         let mut equations = None;
         for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
-            self.refresh_one(stored, &frame[stored.cell as usize], with, &mut equations);
+            self.refresh_one::<V>(stored, &frame[stored.cell as usize], with, &mut equations);
         }
     }
 
     #[inline(always)]
-    fn refresh_one(
+    fn refresh_one<V: Vector8>(
         &self,
         stored: &mut Stored,
         frame: &Rotation,
@@ -83,16 +83,26 @@ impl Context<'_> {
             let merges = fine.cells[child].level != cell.level;
             if let Some(A) = self.carried(child).filter(|_| merges && thin.is_none()) {
                 match turn {
-                    Some(Q) => sum.add(&A.rotated(&Q)),
-                    None => sum.add(A),
+                    Some(Q) => sum.add::<V>(&A.rotated::<V>(&Q)),
+                    None => sum.add::<V>(A),
                 }
                 continue;
             }
             let mut A = cell_matrix(self.hierarchy, (self.l - 1, child), self.fine, self.shared, self.eighth);
-            if let Some(Q) = turn {
-                A = A.rotated(&Q);
+            let holds =
+                !self.held.is_empty() && fine.vertices[child].iter().any(|&v| self.held[v as usize] != 0);
+            if merges && thin.is_none() && !holds && fine.hanging[child] == 0 {
+                let A = match turn {
+                    Some(Q) => A.rotated_flipped::<V>(&Q),
+                    None => A.flipped::<V>(),
+                };
+                A.add_to_parent::<V>(fine.cells[child].octant(), &mut sum);
+                continue;
             }
-            if !self.held.is_empty() {
+            if let Some(Q) = turn {
+                A = A.rotated::<V>(&Q);
+            }
+            if holds {
                 for (c, &v) in fine.vertices[child].iter().enumerate() {
                     match self.held[v as usize] {
                         fixed @ 0..INCLINED => A.hold(c, fixed),
@@ -104,13 +114,13 @@ impl Context<'_> {
                 thin.add(fine, child, &A);
             }
             if merges {
-                sum.add(&A.carried(&corners_in(fine, child, cell)));
+                sum.add::<V>(&A.carried::<V>(&corners_in(fine, child, cell)));
             } else {
-                sum.add(&A);
+                sum.add::<V>(&A);
             }
         }
         if !coarse.leaf[id] && coarse.hanging[id] != 0 {
-            sum = sum.carried(&weights(cell, coarse.hanging[id]));
+            sum = sum.carried::<V>(&weights(cell, coarse.hanging[id]));
         }
         if let Some(thin) = thin {
             thin.relax(&mut sum, &mut stored.inner);
@@ -121,20 +131,21 @@ impl Context<'_> {
 
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
-    //! The same compiled for AVX2. Nothing is contracted, so the bits are the same, too.
+    //! The same compiled for AVX2 and FMA.
 
     use super::{Context, Rotation, Stored};
+    use crate::element::avx2::Register;
 
     /// # Safety
-    /// The machine has AVX2.
-    #[target_feature(enable = "avx2")]
+    /// The machine has AVX2 and FMA.
+    #[target_feature(enable = "avx2,fma")]
     pub unsafe fn refresh(
         context: &Context<'_>,
         stored: &mut [Stored],
         frame: &[Rotation],
         with: (f32, bool),
     ) {
-        context.refresh_all(stored, frame, with);
+        context.refresh_all::<Register>(stored, frame, with);
     }
 }
 

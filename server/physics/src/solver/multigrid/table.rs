@@ -34,19 +34,16 @@ pub fn child_weights(child: usize) -> Weights {
 
 /// `stiffness` · K + `mass` · M in single precision, for K of side 1.
 pub fn cube(K: &[[f64; 24]; 24], stiffness: f64, M: Option<&[[f64; 8]; 8]>, mass: f64) -> Dense {
-    let mut out = Dense::default();
-    for (r, row) in K.iter().enumerate() {
-        for (s, k) in row.iter().enumerate() {
-            let inertia = M.filter(|_| r % 3 == s % 3).map_or(0.0, |M| mass * M[r / 3][s / 3]);
-            out.0[s][r] = (stiffness * k + inertia) as f32;
-        }
-    }
-    out
+    Dense::new(|r, s| {
+        let inertia = M.filter(|_| r % 3 == s % 3).map_or(0.0, |M| mass * M[r / 3][s / 3]);
+        (stiffness * K[r][s] + inertia) as f32
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::element::Lanes;
     use crate::material::Lame;
     use crate::operator::cells::unit_stiffness;
 
@@ -55,11 +52,9 @@ mod tests {
         let K = unit_stiffness(Lame { mu: 3.0, lambda: 7.0 });
         let fine = cube(&K, 1.0, None, 0.0);
         let mut merged = Dense::default();
-        (0..8).for_each(|child| merged.add(&fine.carried(&child_weights(child))));
-        for (column, expected) in merged.0.iter().zip(&K) {
-            for (a, b) in column.iter().zip(expected) {
-                assert!((f64::from(*a) - 2.0 * b).abs() < 1e-5, "{a} {b}");
-            }
+        (0..8).for_each(|child| merged.add::<Lanes>(&fine.carried::<Lanes>(&child_weights(child))));
+        for (a, b) in merged.wide().as_flattened().iter().zip(K.as_flattened()) {
+            assert!((a - 2.0 * b).abs() < 1e-5, "{a} {b}");
         }
     }
 

@@ -193,11 +193,11 @@ impl<'a> Thin<'a> {
     pub fn add(&mut self, fine: &Level, child: usize, A: &Dense) {
         let places = fine.vertices[child].map(|v| self.vertices.iter().position(|w| *w == v).unwrap_or(0));
         for (c, &place) in places.iter().enumerate() {
-            (0..3).for_each(|k| self.diagonal[place][k] += A.0[3 * c + k][3 * c + k]);
+            (0..3).for_each(|k| self.diagonal[place][k] += A.entry(3 * c + k, 3 * c + k));
         }
         for (c, &row) in places.iter().enumerate().filter(|(_, row)| self.inner[**row] < INNER) {
             for r in 0..3 {
-                let entries = A.0[3 * c + r].map(f64::from);
+                let entries = A.row(3 * c + r).map(f64::from);
                 let at = 3 * self.inner[row] + r;
                 let (of_inner, of_corners) = (&mut self.equations.A[at], &mut self.equations.AW[at]);
                 for (entries, &column) in entries.chunks_exact(3).zip(&places) {
@@ -253,8 +253,7 @@ impl<'a> Thin<'a> {
         }
         for p in 0..24 {
             for q in p..24 {
-                sum.0[p][q] = (f64::from(sum.0[p][q]) - product[p][q]) as f32;
-                sum.0[q][p] = sum.0[p][q];
+                sum.set(p, q, (f64::from(sum.entry(p, q)) - product[p][q]) as f32);
             }
         }
         // D = −U⁻¹ X.
