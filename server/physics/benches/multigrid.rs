@@ -97,6 +97,20 @@ fn measure(octree: &Octree, threads: usize) {
         multigrid.update(&mut team, (with, &fixed), &|_| Matrix3::identity());
         renewed = renewed.min(begin.elapsed().as_secs_f64());
     }
+    // A body that bends on: every cell has a rotation of its own, and most coarse cells a matrix of theirs.
+    let centres: Vec<f64> = octree.cells().iter().map(|cell| f64::from(cell.at[2])).collect();
+    let height = centres.iter().fold(0.0, |height: f64, z| height.max(*z));
+    let mut bent = f64::INFINITY;
+    for angle in [0.8, 1.0, 0.8, 1.0] {
+        let bend = |id: u32| {
+            let angle = angle * centres[id as usize] / height;
+            Rotation3::new(Vector3::new(angle, 0.3 * angle * angle, 0.0)).into_inner().cast()
+        };
+        let begin = Instant::now();
+        multigrid.update(&mut team, (&with, &fixed), &bend);
+        bent = bent.min(begin.elapsed().as_secs_f64());
+    }
+    multigrid.update(&mut team, (&with, &fixed), &|_| Matrix3::identity());
 
     let r = vec![[1.0, -0.5, 0.25, 0.0]; x.len()];
     let mut z = r.clone();
@@ -110,12 +124,13 @@ fn measure(octree: &Octree, threads: usize) {
     let ms = |t: std::time::Duration| 1e3 * t.as_secs_f64();
     println!(
         "{cells} cells, {threads} threads: built in {:.0} ms, first update {:.0} ms, again {:.0} ms, eigenvalues {:.0} ms, \
-         rigid rotation {:.0} ms, cycle {:.1} ms ({:.2} M cells/s)",
+         rigid rotation {:.0} ms, bending {:.0} ms, cycle {:.1} ms ({:.2} M cells/s)",
         ms(built),
         ms(first),
         1e3 * renewed,
         ms(estimated),
         ms(followed),
+        1e3 * bent,
         1e3 * best,
         cells as f64 / best / 1e6,
     );

@@ -2,6 +2,8 @@
 //!
 //! Rows and columns of the same components make a plane of 8×8 entries, whose columns are eight lanes. Rotations act
 //! on components and interpolation acts on vertices, so both work on whole columns of planes.
+//!
+//! Loops instead of closures in all that works on registers: see [`Vector8`].
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -119,9 +121,8 @@ impl Dense {
     /// The same by planes below the diagonal.
     #[inline(always)]
     pub fn flipped<V: Vector8>(&self) -> Flipped {
-        let mut out = self.0;
-        (0..6).filter(|p| !is_diagonal(*p)).for_each(|p| out[p] = transposed::<V>(&self.0[p]));
-        Flipped(out)
+        let [xx, xy, xz, yy, yz, zz] = &self.0;
+        Flipped([*xx, transposed::<V>(xy), transposed::<V>(xz), *yy, transposed::<V>(yz), *zz])
     }
 
     /// Q A Qᵀ, with the rotation `Q` on every vertex.
@@ -332,8 +333,10 @@ fn times_weights<V: Vector8>(columns: &Plane, T: &Weights) -> Plane {
     let mut out = Plane::default();
     for (column, row) in columns.iter().zip(T) {
         let column = V::load(column);
-        for (out, &w) in out.iter_mut().zip(row).filter(|(_, w)| **w != 0.0) {
-            *out = V::splat(w).mul_add(column, V::load(out)).store();
+        for b in 0..8 {
+            if row[b] != 0.0 {
+                out[b] = V::splat(row[b]).mul_add(column, V::load(&out[b])).store();
+            }
         }
     }
     out

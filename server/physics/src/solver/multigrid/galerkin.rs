@@ -15,7 +15,7 @@ use super::dense::Dense;
 use super::hierarchy::Hierarchy;
 use super::level::NONE;
 use super::matrices::{
-    CellMatrix, INCLINED, LevelMatrices, Rotation, SAME, Stored, cell_matrix, shared_matrix,
+    CellMatrix, INCLINED, LevelMatrices, Rotation, SAME, Stored, Within, cell_matrix, shared_matrix,
 };
 use super::refresh::Context;
 use super::table;
@@ -128,6 +128,7 @@ impl Galerkin {
         }
         let tolerance = (tolerance as f32).max(SAME);
         let exact = tolerance == SAME;
+        let within = Within::new(tolerance);
         let finest = &mut self.levels[0];
         finest.changed.fill(anew);
         finest.mark_touched();
@@ -139,7 +140,7 @@ impl Galerkin {
         });
         let mut any = anew;
         for l in 1..self.levels.len() {
-            any |= self.update_level(team, hierarchy, l, (tolerance, exact, anew));
+            any |= self.update_level(team, hierarchy, l, (within, exact, anew));
         }
         Updated { constants: anew, matrices: any, released }
     }
@@ -234,7 +235,7 @@ impl Galerkin {
         team: &mut Team,
         hierarchy: &Hierarchy,
         l: usize,
-        (tolerance, exact, anew): (f32, bool, bool),
+        (within, exact, anew): (Within, bool, bool),
     ) -> bool {
         let (below, level) = self.levels.split_at_mut(l);
         let (fine, level) = (&below[l - 1], &mut level[0]);
@@ -256,8 +257,7 @@ impl Galerkin {
                 *frame = if holds_partly { Rotation::identity() } else { mean(children, &fine.frame) };
                 let near = |&c: &u32| {
                     let c = c as usize;
-                    matches!(fine.matrix[c], CellMatrix::Shared(_))
-                        && frame.angle_to(&fine.frame[c]) <= tolerance
+                    matches!(fine.matrix[c], CellMatrix::Shared(_)) && within.holds(frame, &fine.frame[c])
                 };
                 let is_kind = kinds[id] != NONE && (exactness[id] || !exact);
                 let whole = !holds_any && is_kind && children.iter().all(near);
@@ -320,7 +320,7 @@ impl Galerkin {
         let frame = &*frame;
         let simd = Simd::detect();
         team.for_blocks(blocks(stored, STORED_BLOCK), |_, stored| {
-            context.refresh(simd, stored, frame, (tolerance, anew));
+            context.refresh(simd, stored, frame, (within, anew));
         });
         for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
             changed[stored.cell as usize] |= stored.stale;

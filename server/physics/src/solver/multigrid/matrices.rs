@@ -16,6 +16,27 @@ pub(super) const SAME: f32 = 2e-6;
 /// Rotation of a cell.
 pub(super) type Rotation = UnitQuaternion<f32>;
 
+/// The largest angle between rotations that count as the same.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Within {
+    /// tan² of half the angle.
+    limit: f32,
+}
+
+impl Within {
+    /// At most `angle` [rad], below π.
+    pub fn new(angle: f32) -> Self {
+        Self { limit: (0.5 * angle).tan().powi(2) }
+    }
+
+    /// Whether the angle between `a` and `b` is at most this.
+    #[inline(always)]
+    pub fn holds(self, a: &Rotation, b: &Rotation) -> bool {
+        let between = a.inverse() * b;
+        between.imag().norm_squared() <= self.limit * between.w * between.w
+    }
+}
+
 /// Number of the first entry of `inclined` among the bits of prescribed directions: bits of axes are below it.
 pub(super) const INCLINED: u8 = 8;
 
@@ -121,4 +142,22 @@ pub(super) fn shared_matrix(level: &Level, id: usize, of_kind: &Dense, eighth: f
 /// Weights of the vertices of a cell in its corners.
 pub(super) fn weights(cell: &Cell, hanging: u8) -> Weights {
     corner_weights(cell, hanging).map(|row| row.map(|w| w as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn angles_are_told_apart_at_any_size() {
+        let a = Rotation::from_scaled_axis(Vector3::new(0.4, -1.3, 2.0));
+        for angle in [1e-5, 1e-3, 0.1, 1.0, 3.0] {
+            let b = a * Rotation::from_scaled_axis(Vector3::new(0.0, 0.6, 0.8) * angle);
+            for b in [b, Rotation::new_unchecked(-b.into_inner())] {
+                assert!(Within::new(1.02 * angle).holds(&a, &b), "{angle}");
+                assert!(!Within::new(0.98 * angle).holds(&a, &b), "{angle}");
+            }
+        }
+    }
 }

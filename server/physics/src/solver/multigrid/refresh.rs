@@ -6,7 +6,9 @@ use super::carried::{Carried, corners_in};
 use super::dense::Dense;
 use super::hierarchy::Hierarchy;
 use super::level::NONE;
-use super::matrices::{CellMatrix, INCLINED, LevelMatrices, Rotation, SAME, Stored, cell_matrix, weights};
+use super::matrices::{
+    CellMatrix, INCLINED, LevelMatrices, Rotation, SAME, Stored, Within, cell_matrix, weights,
+};
 use super::thin::{Equations, Thin, is_thin};
 use crate::element::{Lanes, Simd, Vector8};
 use crate::operator::Held;
@@ -28,7 +30,7 @@ pub struct Context<'a> {
 
 impl Context<'_> {
     /// Computes stored matrices of this level, whose cells have these frames, if anything below them changed.
-    pub fn refresh(&self, simd: Simd, stored: &mut [Stored], frame: &[Rotation], with: (f32, bool)) {
+    pub fn refresh(&self, simd: Simd, stored: &mut [Stored], frame: &[Rotation], with: (Within, bool)) {
         match simd {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
@@ -38,7 +40,7 @@ impl Context<'_> {
     }
 
     #[inline(always)]
-    fn refresh_all<V: Vector8>(&self, stored: &mut [Stored], frame: &[Rotation], with: (f32, bool)) {
+    fn refresh_all<V: Vector8>(&self, stored: &mut [Stored], frame: &[Rotation], with: (Within, bool)) {
         let mut equations = None;
         for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
             self.refresh_one::<V>(stored, &frame[stored.cell as usize], with, &mut equations);
@@ -50,7 +52,7 @@ impl Context<'_> {
         &self,
         stored: &mut Stored,
         frame: &Rotation,
-        (tolerance, anew): (f32, bool),
+        (within, anew): (Within, bool),
         equations: &mut Option<Equations>,
     ) {
         let id = stored.cell as usize;
@@ -61,7 +63,7 @@ impl Context<'_> {
             || children
                 .iter()
                 .zip(&stored.relative)
-                .any(|(&c, known)| self.fine.changed[c as usize] || relative(c).angle_to(known) > tolerance);
+                .any(|(&c, known)| self.fine.changed[c as usize] || !within.holds(&relative(c), known));
         if !stored.stale {
             return;
         }
@@ -76,10 +78,12 @@ impl Context<'_> {
                 Thin::new((fine, coarse), &self.hierarchy.steps[self.l - 1], id, is_held, room)
             })
             .flatten();
+        let same = Within::new(SAME);
         for (&child, known) in children.iter().zip(&mut stored.relative) {
             *known = relative(child);
             let child = child as usize;
-            let turn = (known.angle() > SAME).then(|| known.to_rotation_matrix().into_inner());
+            let turn =
+                (!same.holds(known, &Rotation::identity())).then(|| known.to_rotation_matrix().into_inner());
             let merges = fine.cells[child].level != cell.level;
             if let Some(A) = self.carried(child).filter(|_| merges && thin.is_none()) {
                 match turn {
@@ -133,7 +137,7 @@ impl Context<'_> {
 mod avx2 {
     //! The same compiled for AVX2 and FMA.
 
-    use super::{Context, Rotation, Stored};
+    use super::{Context, Rotation, Stored, Within};
     use crate::element::avx2::Register;
 
     /// # Safety
@@ -143,7 +147,7 @@ mod avx2 {
         context: &Context<'_>,
         stored: &mut [Stored],
         frame: &[Rotation],
-        with: (f32, bool),
+        with: (Within, bool),
     ) {
         context.refresh_all::<Register>(stored, frame, with);
     }
