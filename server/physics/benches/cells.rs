@@ -7,6 +7,9 @@
 
 #![allow(clippy::disallowed_methods, clippy::unwrap_used)] // a bench reads the clock
 
+#[path = "bar/peak.rs"]
+mod peak;
+
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -26,7 +29,7 @@ const OPERATIONS: f64 = 504.0;
 fn main() {
     let quick = std::env::args().any(|a| a == "--quick" || a == "--test");
     let (rounds, small) = if quick { (3, true) } else { (200, false) };
-    let peak = multiply_adds();
+    let peak = 1e-9 * peak::multiply_adds(&mut Team::alone(), rounds.min(20));
     println!("1 thread: {peak:.0} Gflop/s of multiply-adds");
     let machine = [1, 2].map(|threads| {
         let bandwidth = triad(&mut Team::new(threads).unwrap(), rounds.min(20), small);
@@ -37,22 +40,27 @@ fn main() {
     let adaptive =
         if small { OctreeSettings { cells: 16, levels: 2 } } else { OctreeSettings { cells: 80, levels: 4 } };
     for (name, settings) in [("uniform", uniform), ("adaptive", adaptive)] {
-        measure(name, settings, rounds, machine);
+        for simd in [Simd::detect(), Simd::Avx2] {
+            measure(name, settings, rounds, machine, simd);
+            if simd == Simd::Avx2 || Simd::detect() == Simd::Baseline {
+                break;
+            }
+        }
     }
 }
 
-fn measure(name: &str, settings: OctreeSettings, rounds: usize, machine: [[f64; 2]; 2]) {
+fn measure(name: &str, settings: OctreeSettings, rounds: usize, machine: [[f64; 2]; 2], simd: Simd) {
     let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
     let octree = Octree::fill(&shape, settings, &|_| 0).unwrap();
     let (n, n_cells) = (octree.n_vertices(), octree.cells().len());
     let hanging = octree.hanging().iter().filter(|h| **h != 0).count();
     let start = Instant::now();
-    let mut stiffness = CellStiffness::new(Simd::detect(), &octree, &[]);
+    let mut stiffness = CellStiffness::new(simd, &octree, &[]);
     let arranged = start.elapsed().as_secs_f64();
     let bytes = stiffness.operator().bytes() + n * 16 * 3;
     let [lanes, rows] = stiffness.operator().overheads(n);
     println!(
-        "{name}: {n_cells} cells ({hanging} with hanging corners), {n} vertices; arranged in {:.0} ms; {lanes:.3} \
+        "{name}, {simd:?}: {n_cells} cells ({hanging} with hanging corners), {n} vertices; arranged in {:.0} ms; {lanes:.3} \
          lanes per cell, {rows:.2} rows per vertex, {:.0} bytes per cell",
         arranged * 1e3,
         bytes as f64 / n_cells as f64
@@ -118,31 +126,4 @@ fn triad(team: &mut Team, rounds: usize, small: bool) -> f64 {
         black_box(&mut a);
     });
     12.0 * n as f64 / seconds * 1e-9
-}
-
-/// Peak of one thread with eight lanes [Gflop/s].
-fn multiply_adds() -> f64 {
-    #[cfg(target_arch = "x86_64")]
-    #[allow(unsafe_code)] // the instructions are detected
-    if Simd::detect() == Simd::Avx2 {
-        #[target_feature(enable = "avx2,fma")]
-        fn work(rounds: usize) -> [[f32; 8]; 12] {
-            let mut sums = [[1.0_f32; 8]; 12];
-            for _ in 0..rounds {
-                for sum in &mut sums {
-                    for s in sum {
-                        *s = s.mul_add(0.999, 0.001);
-                    }
-                }
-            }
-            sums
-        }
-        const ROUNDS: usize = 100_000;
-        let seconds = best(20, || {
-            // SAFETY: the instructions were detected.
-            black_box(unsafe { work(black_box(ROUNDS)) });
-        });
-        return (ROUNDS * 12 * 16) as f64 / seconds * 1e-9;
-    }
-    f64::NAN
 }

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::Simd;
 use scindo_physics::material::{Lame, Law};
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace, Shape};
 use scindo_physics::operator::cells::CellStiffness;
 use scindo_physics::operator::{BLOCK, BlockJacobi, ElasticUpdate, FixedCopy, Stiffness};
 use scindo_physics::solver::multigrid::{
@@ -24,6 +24,13 @@ const LAME: Lame = Lame { mu: 4e5, lambda: 6e5 };
 fn main() {
     let quick = std::env::args().any(|a| a == "--quick" || a == "--test");
     let sizes: &[(u32, u8)] = if quick { &[(16, 2)] } else { &[(32, 0), (64, 0), (24, 3), (80, 4)] };
+    let settings = OctreeSettings { cells: if quick { 24 } else { 150 }, levels: if quick { 2 } else { 4 } };
+    let shell = Octree::fill(&Shell, settings, &|_| 0).unwrap();
+    println!("a shell:");
+    for threads in [1, 2] {
+        measure(&shell, threads);
+    }
+    println!("cubes:");
     for &(cells, levels) in sizes {
         let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
         let octree = Octree::fill(&shape, OctreeSettings { cells, levels }, &|_| 0).unwrap();
@@ -37,6 +44,37 @@ fn main() {
                 measure(&cut, threads);
             }
         }
+    }
+}
+
+/// A body whose cells are mostly at its boundary: the space between two spheres and two planes.
+struct Shell;
+
+impl Shape for Shell {
+    fn bounds(&self) -> [Vector3<f64>; 2] {
+        [Vector3::new(-1.0, -1.0, -0.6), Vector3::new(1.0, 1.0, 0.6)]
+    }
+
+    fn contains(&self, p: &Vector3<f64>) -> bool {
+        p.z.abs() <= 0.6 && (0.5..=1.0).contains(&p.norm())
+    }
+
+    fn crossing(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Option<(f64, Vector3<f64>)> {
+        let inside = self.contains(a);
+        (inside != self.contains(b)).then(|| {
+            let (mut low, mut high) = (0.0, 1.0);
+            for _ in 0..30 {
+                let middle = 0.5 * (low + high);
+                if self.contains(&a.lerp(b, middle)) == inside { low = middle } else { high = middle }
+            }
+            let p = a.lerp(b, low);
+            let out = if p.z.abs() > 0.599 {
+                Vector3::z() * p.z.signum()
+            } else {
+                p.normalize() * (p.norm() - 0.75).signum()
+            };
+            (low, out)
+        })
     }
 }
 

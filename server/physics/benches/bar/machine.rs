@@ -2,8 +2,9 @@
 
 use std::time::Instant;
 
-use scindo_physics::element::Simd;
 use scindo_physics::team::{Team, blocks};
+
+use super::peak;
 
 /// Measured limits of this machine for one number of threads.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +27,7 @@ impl Machine {
     pub fn measure(threads: usize, quick: bool) -> Self {
         let mut team = Team::new(threads).unwrap();
         let bandwidth = WORKING_SETS.map(|bytes| triad(&mut team, bytes, if quick { 3 } else { 25 }));
-        Self { bandwidth, flops: multiply_adds(&mut team, if quick { 3 } else { 25 }) }
+        Self { bandwidth, flops: peak::multiply_adds(&mut team, if quick { 3 } else { 25 }) }
     }
 
     /// Index into [`LEVEL_NAMES`] of the level that holds `bytes`; each thread has a second-level cache.
@@ -66,50 +67,4 @@ fn triad(team: &mut Team, bytes: usize, runs: usize) -> f64 {
     }
     assert!(a[n / 2] > 1.0);
     (12 * n) as f64 / best
-}
-
-/// Flops per second of independent multiply-adds in registers.
-fn multiply_adds(team: &mut Team, runs: usize) -> f64 {
-    const REPEATS: usize = 100_000;
-    let mut results = vec![0.0_f32; team.threads()];
-    let mut best = f64::INFINITY;
-    for _ in 0..runs {
-        let start = Instant::now();
-        team.for_blocks(blocks(&mut results, 1), |_, result| result[0] = chains(REPEATS));
-        best = best.min(start.elapsed().as_secs_f64());
-    }
-    assert!(results.iter().all(|r| r.is_finite()));
-    (results.len() * REPEATS * CHAINS * 8 * 2) as f64 / best
-}
-
-const CHAINS: usize = 12;
-
-/// Twelve chains of eight multiply-adds each.
-fn chains(repeats: usize) -> f32 {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
-    fn wide(repeats: usize) -> f32 {
-        use scindo_physics::element::{Vector8, avx2::Register};
-        let (factor, term) = (Register::splat(std::hint::black_box(0.999)), Register::splat(1e-3));
-        let mut x = [Register::splat(1.0); CHAINS];
-        for _ in 0..repeats {
-            for x in &mut x {
-                *x = x.mul_add(factor, term);
-            }
-        }
-        x.iter().map(|x| x.store().0[0]).sum()
-    }
-    #[cfg(target_arch = "x86_64")]
-    if Simd::detect() == Simd::Avx2 {
-        // SAFETY: the instructions were detected.
-        return unsafe { wide(repeats) };
-    }
-    let mut x = [[1.0_f32; 8]; CHAINS];
-    let factor = std::hint::black_box(0.999);
-    for _ in 0..repeats {
-        for x in x.iter_mut().flatten() {
-            *x = *x * factor + 1e-3;
-        }
-    }
-    x.iter().flatten().sum()
 }

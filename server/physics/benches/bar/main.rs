@@ -11,6 +11,7 @@
 #![allow(non_snake_case)] // the symbols of the field: K, M
 
 mod machine;
+mod peak;
 
 use std::time::Instant;
 
@@ -67,14 +68,21 @@ fn main() {
     // From whole steps down to their parts: solver iterations, the product with K, its update.
     let mut lines = Vec::new();
     for threads in [1, 2] {
-        lines.push(steps("bar, 10 iterations", bar(SOFT, 10, 0.0, threads, false), threads, "1.5 / 1.0 ms"));
+        lines.push(steps(
+            "bar, 10 iterations",
+            bar(SOFT, 10, 0.0, threads, Simd::detect()),
+            threads,
+            "1.5 / 1.0 ms",
+        ));
     }
-    lines.push(steps("bar, 10 iterations, portable", bar(SOFT, 10, 0.0, 1, true), 1, ""));
+    for simd in [Simd::Avx2, Simd::Baseline].into_iter().filter(|simd| *simd < Simd::detect()) {
+        lines.push(steps(&format!("bar, 10 iterations, {simd:?}"), bar(SOFT, 10, 0.0, 1, simd), 1, ""));
+    }
     // 1.3 times implicit Euler per linear solve; Newmark's method makes two of a body that turns.
     lines.push(steps("bar, BDF2, 10 iterations", swinging(Scheme::Bdf2), 1, "1.3 × Euler"));
     lines.push(steps("bar, Newmark, 2 × 10", swinging(Scheme::AVERAGE_ACCELERATION), 1, "2 × 1.3 × Euler"));
     for threads in [1, 2] {
-        let body = bar(SOFT, 1000, 1e-6, threads, false);
+        let body = bar(SOFT, 1000, 1e-6, threads, Simd::detect());
         lines.push(steps("bar, to 1e-6", body, threads, "25 ms"));
     }
     for threads in [1, 2] {
@@ -173,9 +181,9 @@ fn clamped(mesh: TetMesh, material: Material, settings: BodySettings) -> Body {
 }
 
 /// The drooping bar of 12 800 tets, h = 40 ms.
-fn bar(material: Material, iterations: u32, tolerance: f64, threads: usize, portable: bool) -> Body {
+fn bar(material: Material, iterations: u32, tolerance: f64, threads: usize, simd: Simd) -> Body {
     let solver = PcgSettings { iterations, tolerance };
-    let settings = BodySettings { solver, threads, portable, ..BodySettings::default() };
+    let settings = BodySettings { solver, threads, simd, ..BodySettings::default() };
     clamped(boxed([1.0, 0.2, 0.2], [40, 8, 8]), material, settings)
 }
 

@@ -530,7 +530,7 @@ fn step_solver(
 ) -> Result<Box<dyn StepSolver>, BodyError> {
     let (law, scheme) = (material.law, settings.scheme);
     let stiffness = match settings.arithmetic(law) {
-        Arithmetic::Single => space.stiffness(settings.portable),
+        Arithmetic::Single => space.stiffness(settings.simd),
         Arithmetic::Mixed | Arithmetic::Double => None,
     };
     let Some(mut stiffness) = stiffness else {
@@ -541,6 +541,6 @@ fn step_solver(
     stiffness.set_choice(settings.operator(law, space.n_pieces()));
     let (solver, ablation) = (settings.step_solver(law), settings.ablation);
     let ablated = (ablation.predictor, ablation.lagged_friction);
-    let stiffness = (stiffness, settings.portable);
+    let stiffness = (stiffness, settings.simd);
     Ok(Box::new(LinearlyImplicit::new((scheme, *material), solver, stiffness, ablated)))
 }

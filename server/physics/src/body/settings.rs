@@ -4,6 +4,7 @@ use super::{Ablation, BodyError, CuttingMethod, LooseRule, cost};
 use crate::assembly::{ElementKind, Volumetric};
 use crate::cut::FrontRule;
 use crate::cut::remesh::SnapSettings;
+use crate::element::Simd;
 use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
 use crate::material::{Fibres, Law, Prony};
 use crate::operator::OperatorChoice;
@@ -29,8 +30,9 @@ pub struct BodySettings {
     /// Number of threads that work on a step, the caller's included; at least 1, at most
     /// [`MOST_THREADS`](Self::MOST_THREADS).
     pub threads: usize,
-    /// Use only instructions that every machine has, so that the bits are the same everywhere.
-    pub portable: bool,
+    /// Instructions of the kernels, as far as the machine has them. Those of [`Simd::Baseline`] give the same bits on
+    /// every machine of the architecture.
+    pub simd: Simd,
     /// Finite element. Only [`ElementKind::Tet4`] can be cut.
     pub element: ElementKind,
     /// Whether the hexahedra of [`ElementKind::Hex8`] are equal cubes, which the kernels of cells take. A body finds
@@ -105,7 +107,7 @@ impl Default for BodySettings {
         Self {
             solver: PcgSettings { iterations: 50, tolerance: 1e-3 },
             threads: 1,
-            portable: false,
+            simd: Simd::detect(),
             element: ElementKind::Tet4,
             cubes: false,
             fibres: Fibres::default(),

@@ -15,12 +15,12 @@ use std::arch::x86_64::{
 };
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::lanes::{Ids, Lanes, Vector8};
+use super::lanes::{Ids, Lanes, Vector, Vector8};
 
 /// Eight lanes in one AVX register, for use only inside functions that enable AVX2 and FMA.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
-pub struct Register(__m256);
+pub struct Register(pub(super) __m256);
 
 macro_rules! lanewise {
     ($trait:ident, $method:ident, $intrinsic:ident) => {
@@ -47,23 +47,13 @@ impl Neg for Register {
     }
 }
 
-impl Vector8 for Register {
+impl Vector for Register {
+    const ALL: u16 = 0xFF;
+
     #[inline(always)]
     fn splat(value: f32) -> Self {
         // SAFETY: only reached from functions that enable AVX2.
         Self(unsafe { _mm256_set1_ps(value) })
-    }
-
-    #[inline(always)]
-    fn load(lanes: &Lanes) -> Self {
-        // SAFETY: both are 32 bytes of plain f32.
-        Self(unsafe { _mm256_loadu_ps(lanes.0.as_ptr()) })
-    }
-
-    #[inline(always)]
-    fn store(self) -> Lanes {
-        // SAFETY: both are 32 bytes of plain f32.
-        unsafe { std::mem::transmute::<__m256, Lanes>(self.0) }
     }
 
     #[inline(always)]
@@ -85,9 +75,36 @@ impl Vector8 for Register {
     }
 
     #[inline(always)]
-    fn above(self, threshold: f32) -> u8 {
+    fn above(self, threshold: f32) -> u16 {
         // SAFETY: only reached from functions that enable AVX2.
-        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_set1_ps(threshold))) as u8 }
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_set1_ps(threshold))) as u16 }
+    }
+
+    #[inline(always)]
+    fn with_second(self, _: Self) -> Self {
+        self
+    }
+
+    #[inline(always)]
+    fn prefetch<T>(value: &T) {
+        for line in 0..size_of::<T>().div_ceil(64) {
+            // SAFETY: a hint, within the value.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>((&raw const *value).cast::<i8>().wrapping_add(64 * line)) };
+        }
+    }
+}
+
+impl Vector8 for Register {
+    #[inline(always)]
+    fn load(lanes: &Lanes) -> Self {
+        // SAFETY: both are 32 bytes of plain f32.
+        Self(unsafe { _mm256_loadu_ps(lanes.0.as_ptr()) })
+    }
+
+    #[inline(always)]
+    fn store(self) -> Lanes {
+        // SAFETY: both are 32 bytes of plain f32.
+        unsafe { std::mem::transmute::<__m256, Lanes>(self.0) }
     }
 
     #[inline(always)]
@@ -106,14 +123,6 @@ impl Vector8 for Register {
                 Self(_mm256_permute2f128_ps::<0x31>(c, g)),
                 Self(_mm256_permute2f128_ps::<0x31>(d, h)),
             ]
-        }
-    }
-
-    #[inline(always)]
-    fn prefetch<T>(value: &T) {
-        for line in 0..size_of::<T>().div_ceil(64) {
-            // SAFETY: a hint, within the value.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>((&raw const *value).cast::<i8>().wrapping_add(64 * line)) };
         }
     }
 
@@ -270,7 +279,7 @@ mod tests {
 
     /// Results of every method for some rows, to compare registers with plain lanes.
     #[inline(always)]
-    fn everything<V: Vector8>(x: &[[f32; 4]; N], ids: &[Ids; 2]) -> (Vec<Lanes>, Vec<u8>, Vec<f32>) {
+    fn everything<V: Vector8>(x: &[[f32; 4]; N], ids: &[Ids; 2]) -> (Vec<Lanes>, Vec<u16>, Vec<f32>) {
         let wide: Vec<[f64; 4]> = x.iter().map(|r| [r[0] + 1e6, r[1], r[2], 0.0].map(f64::from)).collect();
         // SAFETY: the test's ids are below N.
         let ([a, b, c], e) = unsafe { (V::gather(x, &ids[0]), V::gather_edges(&wide, &ids[0], &ids[1])) };
@@ -289,13 +298,13 @@ mod tests {
     }
 
     #[target_feature(enable = "avx2,fma")]
-    fn in_registers(x: &[[f32; 4]; N], ids: &[Ids; 2]) -> (Vec<Lanes>, Vec<u8>, Vec<f32>) {
+    fn in_registers(x: &[[f32; 4]; N], ids: &[Ids; 2]) -> (Vec<Lanes>, Vec<u16>, Vec<f32>) {
         everything::<Register>(x, ids)
     }
 
     #[test]
     fn registers_do_what_lanes_do() {
-        if Simd::detect() != Simd::Avx2 {
+        if Simd::detect() == Simd::Baseline {
             return;
         }
         let x: [[f32; 4]; N] = std::array::from_fn(|i| {

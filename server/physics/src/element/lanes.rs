@@ -2,9 +2,10 @@
 //!
 //! Kernels are written once, over [`Vector8`]. [`Lanes`] is its portable implementation and the form in
 //! memory. On x86-64 the same kernels run on AVX2 registers, chosen by run-time detection. (Leaving the
-//! vectorisation of plain arrays to the compiler costs a factor of four.)
+//! vectorisation of plain arrays to the compiler costs a factor of four.) Kernels over [`Batched`] compute two batches
+//! at once where there is AVX-512, with the same bits.
 //!
-//! Code over [`Vector8`] uses only loops and plain arrays. The closures of `array::map` and `array::from_fn`
+//! Code over [`Vector`] uses only loops and plain arrays. The closures of `array::map` and `array::from_fn`
 //! are compiled without the instruction set of the kernel around them, and a single call that is not inlined
 //! costs more than its arithmetic.
 
@@ -25,14 +26,16 @@ pub struct Lanes(
 
 /// The instruction set that the kernels use.
 ///
-/// AVX2 contracts multiply-adds, so the results of the two differ in the last bits. Each alone is
-/// reproducible.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// AVX2 contracts multiply-adds, so its results differ from those without it in the last bits. Each alone is
+/// reproducible. Those of AVX-512 are those of AVX2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Simd {
     /// Instructions that every machine of the architecture has. All such machines compute the same bits.
     Baseline,
     /// AVX2 with fused multiply-add.
     Avx2,
+    /// The same, and AVX-512 for kernels of which two batches fit into its registers.
+    Avx512,
 }
 
 /// A state that was computed with instructions that this machine lacks cannot go on with the same bits.
@@ -40,7 +43,7 @@ impl<'de> serde::Deserialize<'de> for Simd {
     fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         match bool::deserialize(from)? {
             false => Ok(Self::Baseline),
-            true if Self::detect() == Self::Avx2 => Ok(Self::Avx2),
+            true if Self::detect() != Self::Baseline => Ok(Self::detect()),
             true => Err(serde::de::Error::custom(
                 "the state was computed with AVX2, which this machine lacks; continue on one that has it",
             )),
@@ -50,7 +53,7 @@ impl<'de> serde::Deserialize<'de> for Simd {
 
 impl serde::Serialize for Simd {
     fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        (*self == Self::Avx2).serialize(to)
+        (*self != Self::Baseline).serialize(to)
     }
 }
 
@@ -59,7 +62,7 @@ impl Simd {
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            return Simd::Avx2;
+            return if std::arch::is_x86_feature_detected!("avx512f") { Simd::Avx512 } else { Simd::Avx2 };
         }
         Simd::Baseline
     }
@@ -68,16 +71,15 @@ impl Simd {
 /// Row numbers of the eight lanes.
 pub type Ids = [u16; LANES];
 
-/// Arithmetic on eight lanes.
-pub trait Vector8:
+/// Arithmetic on the lanes of one batch or two.
+pub trait Vector:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
+    /// One bit for every lane.
+    const ALL: u16;
+
     /// The same number in every lane.
     fn splat(value: f32) -> Self;
-    /// Reads eight numbers from memory.
-    fn load(lanes: &Lanes) -> Self;
-    /// Writes eight numbers to memory.
-    fn store(self) -> Lanes;
     /// self · b + c, fused where the machine can.
     fn mul_add(self, b: Self, c: Self) -> Self;
     /// 1 / self.
@@ -85,14 +87,88 @@ pub trait Vector8:
     /// √self.
     fn sqrt(self) -> Self;
     /// One bit per lane, lane 0 lowest: set if the lane is above `threshold`. It is not set for NaN.
-    fn above(self, threshold: f32) -> u8;
-
-    /// The transpose of eight rows.
-    fn transposed(rows: [Self; 8]) -> [Self; 8];
+    fn above(self, threshold: f32) -> u16;
+    /// The lanes of the first batch from `self`, and of the second, if there is one, from `other`.
+    fn with_second(self, other: Self) -> Self;
 
     /// Asks for a value that is read soon, where the machine can.
     #[inline(always)]
     fn prefetch<T>(_: &T) {}
+}
+
+/// Vectors over N batches, in which every batch has eight lanes.
+pub trait Batched<const N: usize>: Vector {
+    /// The lanes of one batch.
+    type Part: Vector8;
+
+    /// Reads a field of every batch.
+    fn read<B>(from: &[B; N], field: impl Fn(&B) -> &Lanes) -> Self;
+    /// The same numbers for every batch.
+    fn shared(lanes: &Lanes) -> Self;
+    /// Lanes of batch number `batch`.
+    fn part(self, batch: usize) -> Self::Part;
+
+    /// [`Vector8::gather`] with the ids of every batch.
+    ///
+    /// # Safety
+    /// All ids are below the length of `x`.
+    unsafe fn gather_all<B>(x: &[[f32; 4]], from: &[B; N], ids: impl Fn(&B) -> &Ids) -> [Self; 3];
+
+    /// [`Vector8::gather_edges`] with two lists of ids of every batch.
+    ///
+    /// # Safety
+    /// All ids are below the length of `x`.
+    unsafe fn gather_all_edges<B>(x: &[[f64; 4]], from: &[B; N], ids: impl Fn(&B) -> [&Ids; 2]) -> [Self; 3];
+
+    /// Writes a field of every batch.
+    #[inline(always)]
+    fn write<B>(self, to: &mut [B; N], field: impl Fn(&mut B) -> &mut Lanes) {
+        for batch in 0..N {
+            *field(&mut to[batch]) = self.part(batch).store();
+        }
+    }
+}
+
+impl<V: Vector8> Batched<1> for V {
+    type Part = V;
+
+    #[inline(always)]
+    fn read<B>(from: &[B; 1], field: impl Fn(&B) -> &Lanes) -> Self {
+        V::load(field(&from[0]))
+    }
+
+    #[inline(always)]
+    fn shared(lanes: &Lanes) -> Self {
+        V::load(lanes)
+    }
+
+    #[inline(always)]
+    fn part(self, _: usize) -> V {
+        self
+    }
+
+    #[inline(always)]
+    unsafe fn gather_all<B>(x: &[[f32; 4]], from: &[B; 1], ids: impl Fn(&B) -> &Ids) -> [Self; 3] {
+        // SAFETY: the caller's promise.
+        unsafe { V::gather(x, ids(&from[0])) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather_all_edges<B>(x: &[[f64; 4]], from: &[B; 1], ids: impl Fn(&B) -> [&Ids; 2]) -> [Self; 3] {
+        let [from, to] = ids(&from[0]);
+        // SAFETY: the caller's promise.
+        unsafe { V::gather_edges(x, from, to) }
+    }
+}
+
+/// Eight lanes and how they lie in memory.
+pub trait Vector8: Vector {
+    /// Reads eight numbers from memory.
+    fn load(lanes: &Lanes) -> Self;
+    /// Writes eight numbers to memory.
+    fn store(self) -> Lanes;
+    /// The transpose of eight rows.
+    fn transposed(rows: [Self; 8]) -> [Self; 8];
 
     /// Rows `ids` of `x` as vectors of x, y and z.
     ///
@@ -121,20 +197,12 @@ pub trait Vector8:
     unsafe fn scatter_blocks(y: &mut [[f32; 8]], ids: &Ids, block: [Self; 6]);
 }
 
-impl Vector8 for Lanes {
+impl Vector for Lanes {
+    const ALL: u16 = 0xFF;
+
     #[inline(always)]
     fn splat(value: f32) -> Self {
         Self([value; LANES])
-    }
-
-    #[inline(always)]
-    fn load(lanes: &Lanes) -> Self {
-        *lanes
-    }
-
-    #[inline(always)]
-    fn store(self) -> Lanes {
-        self
     }
 
     // Never `f32::mul_add`: without the instruction that is a library call.
@@ -154,8 +222,25 @@ impl Vector8 for Lanes {
     }
 
     #[inline(always)]
-    fn above(self, threshold: f32) -> u8 {
-        (0..LANES).fold(0, |bits, lane| bits | u8::from(self.0[lane] > threshold) << lane)
+    fn above(self, threshold: f32) -> u16 {
+        (0..LANES).fold(0, |bits, lane| bits | u16::from(self.0[lane] > threshold) << lane)
+    }
+
+    #[inline(always)]
+    fn with_second(self, _: Self) -> Self {
+        self
+    }
+}
+
+impl Vector8 for Lanes {
+    #[inline(always)]
+    fn load(lanes: &Lanes) -> Self {
+        *lanes
+    }
+
+    #[inline(always)]
+    fn store(self) -> Lanes {
+        self
     }
 
     #[inline(always)]

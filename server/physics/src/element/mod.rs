@@ -5,6 +5,8 @@ mod polar;
 mod lanes;
 #[cfg(target_arch = "x86_64")]
 pub mod avx2;
+#[cfg(target_arch = "x86_64")]
+pub mod avx512;
 mod polar_lanes;
 mod tet4;
 pub mod quadrature;
@@ -16,7 +18,7 @@ mod points;
 mod material_point;
 
 pub(crate) use lanes::for_eight;
-pub use lanes::{Ids, LANES, Lanes, Simd, Vector8};
+pub use lanes::{Batched, Ids, LANES, Lanes, Simd, Vector, Vector8};
 pub use material_point::{MOST_CARRIERS, MaterialPoint};
 pub use points::{Point, Points};
 pub use polar::polar_rotation;

@@ -1,6 +1,6 @@
 //! Rotations of eight deformation gradients at once, for the ordinary case det F > 0.
 
-use super::Vector8;
+use super::Vector;
 
 /// A 3×3 matrix in every lane, row by row.
 pub type Mat3<V> = [V; 9];
@@ -13,8 +13,8 @@ const WELL_CONDITIONED: f32 = 0.01;
 const NEARLY_RIGID: f32 = 0.95;
 /// Above this the stretches are within 0.6 … 1.5 and four plain iterations reach 1e-8.
 const MODERATE: f32 = 0.75;
-/// Mask of all lanes.
-const ALL: u8 = u8::MAX;
+/// Lanes of one batch.
+const BATCH: u16 = 0xFF;
 
 /// Polar rotations by Newton's iteration X ← ½(ζX + X⁻ᵀ/ζ), and one bit per lane that is set if its rotation
 /// can be trusted.
@@ -25,7 +25,7 @@ const ALL: u8 = u8::MAX;
 /// # Source
 /// Higham 1986, "Computing the polar decomposition, with applications".
 #[inline(always)]
-pub fn polar_newton<V: Vector8>(F: &Mat3<V>) -> (Mat3<V>, u8) {
+pub fn polar_newton<V: Vector>(F: &Mat3<V>) -> (Mat3<V>, u16) {
     // Scaling F leaves the rotation unchanged, and keeps the cubes and squares below in range.
     let shrink = (norm_squared(F) * V::splat(1.0 / 3.0)).sqrt().recip();
     let mut X = *F;
@@ -35,33 +35,71 @@ pub fn polar_newton<V: Vector8>(F: &Mat3<V>) -> (Mat3<V>, u8) {
     let C = cofactor(&X);
     let det = determinant(&X, &C);
     let trusted = det.above(WELL_CONDITIONED);
-    let mut left = if det.above(MODERATE) == ALL {
-        X = plain_iteration(&X, &C, det);
-        if det.above(NEARLY_RIGID) == ALL { 2 } else { 3 }
-    } else {
+    let (moderate, rigid) = (det.above(MODERATE), det.above(NEARLY_RIGID));
+    // Every batch has the iterations that it would have alone, and so the same bits.
+    let (first, second) = (Stretch::of(moderate, rigid), Stretch::of(moderate >> 8, rigid >> 8));
+    let mut R = iterated(&X, &C, det, first);
+    if V::ALL > BATCH && second != first {
+        let other = iterated(&X, &C, det, second);
+        for i in 0..9 {
+            R[i] = R[i].with_second(other[i]);
+        }
+    }
+    (R, trusted)
+}
+
+/// How much the lanes of a batch are stretched at most.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stretch {
+    /// Nearly not.
+    Little,
+    Moderate,
+    Much,
+}
+
+impl Stretch {
+    /// That of the batch in the lower bits, one for each lane of these grades.
+    #[inline(always)]
+    fn of(moderate: u16, rigid: u16) -> Self {
+        match (moderate & BATCH == BATCH, rigid & BATCH == BATCH) {
+            (true, true) => Self::Little,
+            (true, false) => Self::Moderate,
+            (false, _) => Self::Much,
+        }
+    }
+}
+
+/// The rotation after as many iterations as the stretch needs.
+#[inline(always)]
+fn iterated<V: Vector>(X: &Mat3<V>, C: &Mat3<V>, det: V, stretch: Stretch) -> Mat3<V> {
+    let (mut X, C) = (*X, *C);
+    let mut left = if stretch == Stretch::Much {
         X = scaled_iteration(&X, &C, det);
         let C = cofactor(&X);
         X = scaled_iteration(&X, &C, determinant(&X, &C));
         3
+    } else {
+        X = plain_iteration(&X, &C, det);
+        if stretch == Stretch::Little { 2 } else { 3 }
     };
     while left > 0 {
         let C = cofactor(&X);
         X = plain_iteration(&X, &C, determinant(&X, &C));
         left -= 1;
     }
-    (X, trusted)
+    X
 }
 
 /// ½ (X + X⁻ᵀ), X⁻ᵀ = C / det.
 #[inline(always)]
-fn plain_iteration<V: Vector8>(X: &Mat3<V>, C: &Mat3<V>, det: V) -> Mat3<V> {
+fn plain_iteration<V: Vector>(X: &Mat3<V>, C: &Mat3<V>, det: V) -> Mat3<V> {
     let half = V::splat(0.5);
     combination(X, half, C, half * det.recip())
 }
 
 /// ½ (ζ X + X⁻ᵀ/ζ).
 #[inline(always)]
-fn scaled_iteration<V: Vector8>(X: &Mat3<V>, C: &Mat3<V>, det: V) -> Mat3<V> {
+fn scaled_iteration<V: Vector>(X: &Mat3<V>, C: &Mat3<V>, det: V) -> Mat3<V> {
     let half = V::splat(0.5);
     let zeta_squared = (norm_squared(C) * (norm_squared(X) * det * det).recip()).sqrt();
     let zeta = zeta_squared.sqrt();
@@ -69,7 +107,7 @@ fn scaled_iteration<V: Vector8>(X: &Mat3<V>, C: &Mat3<V>, det: V) -> Mat3<V> {
 }
 
 #[inline(always)]
-fn combination<V: Vector8>(X: &Mat3<V>, keep: V, C: &Mat3<V>, add: V) -> Mat3<V> {
+fn combination<V: Vector>(X: &Mat3<V>, keep: V, C: &Mat3<V>, add: V) -> Mat3<V> {
     let mut next = *X;
     for i in 0..9 {
         next[i] = X[i].mul_add(keep, C[i] * add);
@@ -78,12 +116,12 @@ fn combination<V: Vector8>(X: &Mat3<V>, keep: V, C: &Mat3<V>, add: V) -> Mat3<V>
 }
 
 #[inline(always)]
-fn determinant<V: Vector8>(X: &Mat3<V>, C: &Mat3<V>) -> V {
+fn determinant<V: Vector>(X: &Mat3<V>, C: &Mat3<V>) -> V {
     X[0].mul_add(C[0], X[1].mul_add(C[1], X[2] * C[2]))
 }
 
 #[inline(always)]
-fn norm_squared<V: Vector8>(X: &Mat3<V>) -> V {
+fn norm_squared<V: Vector>(X: &Mat3<V>) -> V {
     let mut sum = X[0] * X[0];
     for x in &X[1..] {
         sum = x.mul_add(*x, sum);
@@ -93,7 +131,7 @@ fn norm_squared<V: Vector8>(X: &Mat3<V>) -> V {
 
 /// det(X) X⁻ᵀ: rows are cross products of the other two rows.
 #[inline(always)]
-fn cofactor<V: Vector8>(X: &Mat3<V>) -> Mat3<V> {
+fn cofactor<V: Vector>(X: &Mat3<V>) -> Mat3<V> {
     [
         minor(X, 4, 8, 5, 7),
         minor(X, 5, 6, 3, 8),
@@ -108,7 +146,7 @@ fn cofactor<V: Vector8>(X: &Mat3<V>) -> Mat3<V> {
 }
 
 #[inline(always)]
-fn minor<V: Vector8>(X: &Mat3<V>, a: usize, b: usize, c: usize, d: usize) -> V {
+fn minor<V: Vector>(X: &Mat3<V>, a: usize, b: usize, c: usize, d: usize) -> V {
     X[a].mul_add(X[b], -(X[c] * X[d]))
 }
 

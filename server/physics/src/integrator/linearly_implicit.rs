@@ -13,7 +13,7 @@ use super::step_inputs::{Inertia, LinearInputs, StepInputs, StepOutcome};
 use super::step_solver::{SolverSettings, StepSolver};
 use super::together::Member;
 use crate::assembly::ModelError;
-use crate::element::Points;
+use crate::element::{Points, Simd};
 use crate::material::Material;
 use crate::octree::OctreeSpace;
 use crate::operator::{ElasticUpdate, Stiffness};
@@ -55,7 +55,7 @@ pub struct LinearlyImplicit {
     #[serde(with = "crate::operator::saved_stiffness")]
     stiffness: Box<dyn Stiffness>,
     /// Whether the stiffness uses only instructions that every machine has.
-    portable: bool,
+    simd: Simd,
     mass_f32: Vec<f32>,
     step: LinearStep,
     weightless: Vec<Weightless>,
@@ -72,12 +72,12 @@ struct Weightless {
 }
 
 impl LinearlyImplicit {
-    /// Steps with `stiffness`, which was made for `portable` instructions or not. `at_start` linearises at
+    /// Steps with `stiffness`, which was made for the instructions `simd`. `at_start` linearises at
     /// the positions of the last step, and `lagged` takes friction from the last step; only mutation tests set them.
     pub fn new(
         (scheme, material): (Scheme, Material),
         settings: SolverSettings,
-        (stiffness, portable): (Box<dyn Stiffness>, bool),
+        (stiffness, simd): (Box<dyn Stiffness>, Simd),
         (at_start, lagged): (bool, bool),
     ) -> Self {
         let (solves, pcg) = settings.linear;
@@ -90,7 +90,7 @@ impl LinearlyImplicit {
             simulate_level: usize::from(settings.simulate_level),
             relaxes: settings.relaxation.is_some(),
             stiffness,
-            portable,
+            simd,
             mass_f32: Vec::new(),
             step: LinearStep::new(at_start, lagged),
             weightless: Vec::new(),
@@ -270,7 +270,7 @@ impl StepSolver for LinearlyImplicit {
     /// The pieces are arranged anew, without rotations.
     fn rebuild(&mut self, space: &dyn Space) -> Result<(), ModelError> {
         let choice = self.stiffness.choice();
-        if let Some(stiffness) = space.stiffness(self.portable) {
+        if let Some(stiffness) = space.stiffness(self.simd) {
             self.stiffness = stiffness;
         }
         self.stiffness.set_choice(choice);

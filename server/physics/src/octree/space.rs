@@ -471,8 +471,8 @@ impl Space for OctreeSpace {
             + TRIANGLE_BYTES * self.surface.surface().triangles.len()
     }
 
-    fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>> {
-        let simd = if portable { Simd::Baseline } else { Simd::detect() };
+    fn stiffness(&self, simd: Simd) -> Option<Box<dyn Stiffness>> {
+        let simd = simd.min(Simd::detect());
         let lame: Vec<Lame> = self.octree.regions().iter().map(Region::lame).collect();
         Some(Box::new(CellStiffness::new(simd, &self.octree, &lame)))
     }

@@ -127,7 +127,11 @@ pub fn corner_weights(cell: &Cell, hanging: u8) -> [[f64; 8]; 8] {
 }
 
 /// Sums of the columns of W: how many corners of a cell each of its eight vertices carries.
+#[inline]
 pub fn corner_shares(cell: &Cell, hanging: u8) -> [f64; 8] {
+    if hanging == 0 {
+        return [1.0; 8];
+    }
     let mut shares = [0.0; 8];
     (0..8).for_each(|c| for_weights(cell, hanging, c, |vertex, w| shares[vertex] += w));
     shares

@@ -135,8 +135,8 @@ impl EdgeBlocks {
         assert!(x.len() == self.n_locals && y.len() == self.n_locals);
         match simd {
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
-            Simd::Avx2 => unsafe { avx2::apply(&self.batches, x, y) },
+            // SAFETY: both come from `Simd::detect` only.
+            Simd::Avx2 | Simd::Avx512 => unsafe { avx2::apply(&self.batches, x, y) },
             _ => apply_with::<Lanes>(&self.batches, x, y),
         }
     }
@@ -147,7 +147,7 @@ impl EdgeBlocks {
     }
 }
 
-// Loops instead of closures: see `Vector8`.
+// Loops instead of closures: see `Vector`.
 #[inline(always)]
 fn apply_with<V: Vector8>(batches: &[EdgeBatch], x: &[Padded], y: &mut [Padded]) {
     for batch in batches {

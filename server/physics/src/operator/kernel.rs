@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 
 use super::Padded;
 use super::shared_lanes::Merged;
-use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
+use crate::element::{Batched, Ids, LANES, Lanes, Mat3, Simd, Vector, Vector8, polar_newton, polar_rotation};
 use crate::mesh::TetMesh;
 
 /// Data that one application streams, per batch of eight pieces.
@@ -203,9 +203,12 @@ impl Batches {
         assert!(x.len() == self.n_locals && y.len() == self.n_locals);
         match simd {
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
+            // SAFETY: these come from `Simd::detect` only.
             Simd::Avx2 => unsafe { avx2::apply(&self.live, self.ratio, x, y) },
-            _ => apply_with::<Lanes>(&self.live, self.ratio, x, y),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Simd::Avx512 => unsafe { avx512::apply(&self.live, self.ratio, x, y) },
+            _ => apply_with::<Lanes, 1>(self.live.as_chunks().0, self.ratio, x, y),
         }
     }
 
@@ -218,9 +221,12 @@ impl Batches {
         let (rest, live) = (&mut self.rest[..], &mut self.live[..]);
         match simd {
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
+            // SAFETY: these come from `Simd::detect` only.
             Simd::Avx2 => unsafe { avx2::update(c, rest, live, locals) },
-            _ => update_with::<Lanes>(c, rest, live, locals),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Simd::Avx512 => unsafe { avx512::update(c, rest, live, locals) },
+            _ => update_with::<Lanes, 1>(c, rest.as_chunks_mut().0, live.as_chunks_mut().0, locals),
         }
     }
 
@@ -230,39 +236,54 @@ impl Batches {
         assert!(u.len() == self.n_locals);
         match simd {
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
-            Simd::Avx2 => unsafe { avx2::energy(c, &self.rest, &self.live, u) },
+            // SAFETY: both come from `Simd::detect` only.
+            Simd::Avx2 | Simd::Avx512 => unsafe { avx2::energy(c, &self.rest, &self.live, u) },
             _ => energy_with::<Lanes>(c, &self.rest, &self.live, u),
         }
     }
 }
 
-// Loops instead of closures below: see `Vector8`.
+// Loops instead of closures below: see `Vector`. Closures that only name a field are none of those.
 
 #[inline(always)]
 fn load<V: Vector8>(l: &[Lanes; 3]) -> [V; 3] {
     [V::load(&l[0]), V::load(&l[1]), V::load(&l[2])]
 }
 
+/// Reads three vectors of every batch.
 #[inline(always)]
-fn product<V: Vector8>(A: &[[V; 3]; 3], v: &[V; 3]) -> [V; 3] {
+fn read<V: Batched<N>, const N: usize, B>(
+    from: &[B; N],
+    field: impl Fn(&B) -> &[[Lanes; 3]; 3],
+) -> [[V; 3]; 3] {
+    let mut out = [[V::splat(0.0); 3]; 3];
+    for k in 0..3 {
+        for i in 0..3 {
+            out[k][i] = V::read(from, |b| &field(b)[k][i]);
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn product<V: Vector>(A: &[[V; 3]; 3], v: &[V; 3]) -> [V; 3] {
     [dot(&A[0], v), dot(&A[1], v), dot(&A[2], v)]
 }
 
 #[inline(always)]
-fn dot<V: Vector8>(a: &[V; 3], b: &[V; 3]) -> V {
+fn dot<V: Vector>(a: &[V; 3], b: &[V; 3]) -> V {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
 /// The vector of corner 0, given that the vectors of all corners sum to 0.
 #[inline(always)]
-fn minus_sum<V: Vector8>(v: &[[V; 3]; 3]) -> [V; 3] {
+fn minus_sum<V: Vector>(v: &[[V; 3]; 3]) -> [V; 3] {
     [-(v[0][0] + v[1][0] + v[2][0]), -(v[0][1] + v[1][1] + v[2][1]), -(v[0][2] + v[1][2] + v[2][2])]
 }
 
 /// H_ij = Σ_k d_k,i g_k,j.
 #[inline(always)]
-fn sum_of_outer_products<V: Vector8>(d: &[[V; 3]; 3], g: &[[V; 3]; 3]) -> [[V; 3]; 3] {
+fn sum_of_outer_products<V: Vector>(d: &[[V; 3]; 3], g: &[[V; 3]; 3]) -> [[V; 3]; 3] {
     let mut H = *d;
     for i in 0..3 {
         for j in 0..3 {
@@ -273,14 +294,23 @@ fn sum_of_outer_products<V: Vector8>(d: &[[V; 3]; 3], g: &[[V; 3]; 3]) -> [[V; 3
 }
 
 #[inline(always)]
-fn apply_with<V: Vector8>(batches: &[Batch], ratio: f32, x: &[Padded], y: &mut [Padded]) {
+fn apply_with<V: Batched<N>, const N: usize>(
+    batches: &[[Batch; N]],
+    ratio: f32,
+    x: &[Padded],
+    y: &mut [Padded],
+) {
     let (half, ratio) = (V::splat(0.5), V::splat(ratio));
     for b in batches {
-        let g: [[V; 3]; 3] = [load(&b.g[0]), load(&b.g[1]), load(&b.g[2])];
+        let g: [[V; 3]; 3] = read(b, |b| &b.g);
         // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
         let (u0, mut d) = unsafe {
-            let d = [V::gather(x, &b.nodes[1]), V::gather(x, &b.nodes[2]), V::gather(x, &b.nodes[3])];
-            (V::gather(x, &b.nodes[0]), d)
+            let d = [
+                V::gather_all(x, b, |b| &b.nodes[1]),
+                V::gather_all(x, b, |b| &b.nodes[2]),
+                V::gather_all(x, b, |b| &b.nodes[3]),
+            ];
+            (V::gather_all(x, b, |b| &b.nodes[0]), d)
         };
         for k in 0..3 {
             for i in 0..3 {
@@ -294,12 +324,23 @@ fn apply_with<V: Vector8>(batches: &[Batch], ratio: f32, x: &[Padded], y: &mut [
         let sxz = half * (H[0][2] + H[2][0]);
         let syz = half * (H[1][2] + H[2][1]);
         let sigma = [[sxx, sxy, sxz], [sxy, syy, syz], [sxz, syz, szz]];
-        scatter_forces(
-            y,
-            &b.nodes,
-            &[product(&sigma, &g[0]), product(&sigma, &g[1]), product(&sigma, &g[2])],
-        );
+        let f = [product(&sigma, &g[0]), product(&sigma, &g[1]), product(&sigma, &g[2])];
+        for batch in 0..N {
+            scatter_forces(y, &b[batch].nodes, &parts(&f, batch));
+        }
     }
+}
+
+/// The vectors of one batch.
+#[inline(always)]
+fn parts<V: Batched<N>, const N: usize>(f: &[[V; 3]; 3], batch: usize) -> [[V::Part; 3]; 3] {
+    let mut out = [[V::Part::splat(0.0); 3]; 3];
+    for k in 0..3 {
+        for i in 0..3 {
+            out[k][i] = f[k][i].part(batch);
+        }
+    }
+    out
 }
 
 /// Adds f_1, f_2, f_3 and f_0 = −(f_1 + f_2 + f_3).
@@ -315,23 +356,22 @@ fn scatter_forces<V: Vector8>(y: &mut [Padded], nodes: &[Ids; 4], f: &[[V; 3]; 3
 }
 
 #[inline(always)]
-fn update_with<V: Vector8>(
+fn update_with<V: Batched<N>, const N: usize>(
     c: &Coefficients,
-    rest: &mut [RestBatch],
-    live: &mut [Batch],
+    rest: &mut [[RestBatch; N]],
+    live: &mut [[Batch; N]],
     locals: &mut Locals<'_>,
 ) -> usize {
     let mut inverted = 0;
     let ratio = V::splat(0.5 * c.lambda / c.mu);
     for (rest, live) in rest.iter_mut().zip(live) {
-        let g: [[V; 3]; 3] = [load(&rest.g[0]), load(&rest.g[1]), load(&rest.g[2])];
-        let nodes = &live.nodes;
+        let g: [[V; 3]; 3] = read(rest, |rest| &rest.g);
         // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
         let e: [[V; 3]; 3] = unsafe {
             [
-                V::gather_edges(locals.x, &nodes[0], &nodes[1]),
-                V::gather_edges(locals.x, &nodes[0], &nodes[2]),
-                V::gather_edges(locals.x, &nodes[0], &nodes[3]),
+                V::gather_all_edges(locals.x, live, |b| [&b.nodes[0], &b.nodes[1]]),
+                V::gather_all_edges(locals.x, live, |b| [&b.nodes[0], &b.nodes[2]]),
+                V::gather_all_edges(locals.x, live, |b| [&b.nodes[0], &b.nodes[3]]),
             ]
         };
         let F = sum_of_outer_products(&e, &g);
@@ -339,15 +379,18 @@ fn update_with<V: Vector8>(
         if c.rotates {
             inverted += rotate(&F, rest);
         }
-        let r = &rest.rotation;
-        let R: [[V; 3]; 3] = [
-            [V::load(&r[0]), V::load(&r[1]), V::load(&r[2])],
-            [V::load(&r[3]), V::load(&r[4]), V::load(&r[5])],
-            [V::load(&r[6]), V::load(&r[7]), V::load(&r[8])],
-        ];
-        let two_mu_volume = V::splat(2.0 * c.mu) * V::load(&rest.volume);
+        let mut R = g;
+        for i in 0..3 {
+            for j in 0..3 {
+                R[i][j] = V::read(rest, |rest| &rest.rotation[3 * i + j]);
+            }
+        }
+        let two_mu_volume = V::splat(2.0 * c.mu) * V::read(rest, |rest| &rest.volume);
         let P = piola_stress(&F, &R, two_mu_volume, ratio);
-        scatter_forces(locals.f, nodes, &[product(&P, &g[0]), product(&P, &g[1]), product(&P, &g[2])]);
+        let f = [product(&P, &g[0]), product(&P, &g[1]), product(&P, &g[2])];
+        for batch in 0..N {
+            scatter_forces(locals.f, &live[batch].nodes, &parts(&f, batch));
+        }
 
         // R and √(2μ w V s) go into the gradients here, so that an application needs neither.
         let root = (two_mu_volume * V::splat(c.scale)).sqrt();
@@ -355,12 +398,15 @@ fn update_with<V: Vector8>(
         for k in 0..3 {
             for i in 0..3 {
                 turned[k][i] = turned[k][i] * root;
-                live.g[k][i] = turned[k][i].store();
+                turned[k][i].write(live, |b| &mut b.g[k][i]);
             }
         }
-        scatter_block(locals.blocks, &nodes[0], &minus_sum(&turned), ratio);
-        for k in 0..3 {
-            scatter_block(locals.blocks, &nodes[k + 1], &turned[k], ratio);
+        for batch in 0..N {
+            let (nodes, turned, ratio) = (&live[batch].nodes, parts(&turned, batch), ratio.part(batch));
+            scatter_block(locals.blocks, &nodes[0], &minus_sum(&turned), ratio);
+            for k in 0..3 {
+                scatter_block(locals.blocks, &nodes[k + 1], &turned[k], ratio);
+            }
         }
     }
     inverted
@@ -419,26 +465,30 @@ fn energy_with<V: Vector8>(c: EnergyCoefficients, rest: &[RestBatch], live: &[Ba
 
 /// Updates the rotation of every used lane; returns how many have det F ≤ 0.
 #[inline(always)]
-fn rotate<V: Vector8>(F: &[[V; 3]; 3], rest: &mut RestBatch) -> usize {
+fn rotate<V: Batched<N>, const N: usize>(F: &[[V; 3]; 3], rest: &mut [RestBatch; N]) -> usize {
     let F = [F[0][0], F[0][1], F[0][2], F[1][0], F[1][1], F[1][2], F[2][0], F[2][1], F[2][2]];
     let (R, trusted) = polar_newton(&F);
     // Lanes that Newton's method cannot handle are rare and leave the hot loop.
-    if trusted == u8::MAX {
+    if trusted == V::ALL {
         for i in 0..9 {
-            rest.rotation[i] = R[i].store();
+            R[i].write(rest, |rest| &mut rest.rotation[i]);
         }
         return 0;
     }
-    let (mut stored_F, mut stored_R) = ([Lanes::default(); 9], [Lanes::default(); 9]);
-    for i in 0..9 {
-        (stored_F[i], stored_R[i]) = (F[i].store(), R[i].store());
+    let mut inverted = 0;
+    for batch in 0..N {
+        let (mut stored_F, mut stored_R) = ([Lanes::default(); 9], [Lanes::default(); 9]);
+        for i in 0..9 {
+            (stored_F[i], stored_R[i]) = (F[i].part(batch).store(), R[i].part(batch).store());
+        }
+        inverted += rotate_guarded(&stored_F, &stored_R, trusted >> (8 * batch), &mut rest[batch]);
     }
-    rotate_guarded(&stored_F, &stored_R, trusted, rest)
+    inverted
 }
 
 #[cold]
 #[inline(never)]
-fn rotate_guarded(F: &Mat3<Lanes>, R: &Mat3<Lanes>, trusted: u8, rest: &mut RestBatch) -> usize {
+fn rotate_guarded(F: &Mat3<Lanes>, R: &Mat3<Lanes>, trusted: u16, rest: &mut RestBatch) -> usize {
     let mut inverted = 0;
     for lane in 0..LANES {
         if trusted >> lane & 1 == 1 {
@@ -460,7 +510,7 @@ fn rotate_guarded(F: &Mat3<Lanes>, R: &Mat3<Lanes>, trusted: u8, rest: &mut Rest
 
 /// w V P = w V R (2μ ε + λ tr(ε) I), ε = sym(RᵀF) − I.
 #[inline(always)]
-fn piola_stress<V: Vector8>(F: &[[V; 3]; 3], R: &[[V; 3]; 3], two_mu_volume: V, ratio: V) -> [[V; 3]; 3] {
+fn piola_stress<V: Vector>(F: &[[V; 3]; 3], R: &[[V; 3]; 3], two_mu_volume: V, ratio: V) -> [[V; 3]; 3] {
     // RᵀF column by column
     let mut S = *F;
     for i in 0..3 {
@@ -516,7 +566,7 @@ mod avx2 {
 
     #[target_feature(enable = "avx2,fma")]
     pub fn apply(batches: &[Batch], ratio: f32, x: &[Padded], y: &mut [Padded]) {
-        super::apply_with::<Register>(batches, ratio, x, y);
+        super::apply_with::<Register, 1>(batches.as_chunks().0, ratio, x, y);
     }
 
     #[target_feature(enable = "avx2,fma")]
@@ -526,11 +576,44 @@ mod avx2 {
         live: &mut [Batch],
         locals: &mut Locals<'_>,
     ) -> usize {
-        super::update_with::<Register>(c, rest, live, locals)
+        super::update_with::<Register, 1>(c, rest.as_chunks_mut().0, live.as_chunks_mut().0, locals)
     }
 
     #[target_feature(enable = "avx2,fma")]
     pub fn energy(c: EnergyCoefficients, rest: &[RestBatch], live: &[Batch], u: &[[f64; 4]]) -> f64 {
         super::energy_with::<Register>(c, rest, live, u)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx512 {
+    //! The same loops for two batches at once; one that is left over takes AVX2.
+
+    use super::{Batch, Coefficients, Locals, Padded, RestBatch};
+    use crate::element::avx2::Register;
+    use crate::element::avx512::Register512;
+
+    #[target_feature(enable = "avx512f,avx2,fma")]
+    pub fn apply(batches: &[Batch], ratio: f32, x: &[Padded], y: &mut [Padded]) {
+        let (pairs, last) = batches.as_chunks();
+        super::apply_with::<Register512, 2>(pairs, ratio, x, y);
+        super::apply_with::<Register, 1>(last.as_chunks().0, ratio, x, y);
+    }
+
+    #[target_feature(enable = "avx512f,avx2,fma")]
+    pub fn update(
+        c: &Coefficients,
+        rest: &mut [RestBatch],
+        live: &mut [Batch],
+        locals: &mut Locals<'_>,
+    ) -> usize {
+        let ((rest, last_rest), (live, last_live)) = (rest.as_chunks_mut(), live.as_chunks_mut());
+        super::update_with::<Register512, 2>(c, rest, live, locals)
+            + super::update_with::<Register, 1>(
+                c,
+                last_rest.as_chunks_mut().0,
+                last_live.as_chunks_mut().0,
+                locals,
+            )
     }
 }

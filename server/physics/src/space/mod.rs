@@ -30,7 +30,7 @@ use nalgebra::Vector3;
 
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{BladeSweep, Components, CutError, CutReport, Flaws, IncisionMark, Solid, Surface, Work};
-use crate::element::{MaterialPoint, Points};
+use crate::element::{MaterialPoint, Points, Simd};
 use crate::material::Material;
 use crate::mesh::MeshError;
 use crate::octree::OctreeSpace;
@@ -274,8 +274,8 @@ pub trait Space: Any + Points + Send + Sync {
     fn bytes(&self) -> usize;
 
     /// The stiffness of the elements for solvers in single precision; `None` if there is no such kernel for
-    /// these elements. `portable` uses only instructions that every machine has.
-    fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>>;
+    /// these elements. Its kernels use the instructions `simd`, as far as the machine has them.
+    fn stiffness(&self, simd: Simd) -> Option<Box<dyn Stiffness>>;
 
     /// Whether the elements are equal cubes without being cells of an octree, so that kernels of cells take them.
     fn is_of_cubes(&self) -> bool {

@@ -493,8 +493,8 @@ impl Space for Tets {
         PIECE_BYTES * self.cut.pieces().len() + TRIANGLE_BYTES * (skin + self.cut.surface().triangles.len())
     }
 
-    fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>> {
-        let simd = if portable { Simd::Baseline } else { Simd::detect() };
+    fn stiffness(&self, simd: Simd) -> Option<Box<dyn Stiffness>> {
+        let simd = simd.min(Simd::detect());
         let mesh = (self.cut.mesh(), &self.regions);
         let elastic = || Elastic::with_regions(simd, mesh, self.cut.pieces(), self.cut.n_copies());
         if let Some(cubes) = self.cubes() {

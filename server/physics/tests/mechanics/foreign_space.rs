@@ -9,7 +9,7 @@ use scindo_physics::body::{Body, BodySettings, CuttingMethod, OperatorChoice, Sc
 use scindo_physics::cut::{
     BladeSweep, Components, CutError, CutMesh, CutReport, Flaws, IncisionMark, Solid, Surface, Work,
 };
-use scindo_physics::element::{Point, Points};
+use scindo_physics::element::{Point, Points, Simd};
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, MeshError, TetMesh, box_mesh};
 use scindo_physics::operator::{Block6, Direction, ElasticUpdate, Padded, Place, StiffModes, Stiffness};
@@ -364,8 +364,8 @@ impl Space for Lattice {
         self.tets.bytes()
     }
 
-    fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>> {
-        let elastic = self.tets.stiffness(portable)?;
+    fn stiffness(&self, simd: Simd) -> Option<Box<dyn Stiffness>> {
+        let elastic = self.tets.stiffness(simd)?;
         Some(Box::new(Kernel { places: elastic.places().into_owned(), elastic }))
     }
 

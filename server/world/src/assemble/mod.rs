@@ -16,6 +16,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 use scindo_physics::assembly::ModelError;
 use scindo_physics::body::{Arithmetic, Body, BodyError, BodySettings, Constants};
+use scindo_physics::element::Simd;
 use scindo_physics::material::{Material, MaterialError, Rayleigh, Regions};
 use scindo_physics::mesh::HexMesh;
 use scindo_physics::octree::OctreeSpace;
@@ -152,7 +153,7 @@ impl Builder<'_> {
         let settings = BodySettings {
             solver: spec.mechanics.linear_solver(along, spec.poisson),
             threads: threads::of_one_body(self.bodies, self.options.threads),
-            portable: self.options.portable,
+            simd: if self.options.portable { Simd::Baseline } else { Simd::detect() },
             simulate_level: spec.octree.map_or(0, |octree| octree.simulate_level),
             ..spec.mechanics.body_settings()
         };

@@ -4,7 +4,7 @@
 
 use super::super::Padded;
 use super::sectors::SectorTable;
-use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8, for_eight};
+use crate::element::{Batched, Ids, LANES, Lanes, Mat3, Simd, Vector, Vector8, for_eight};
 
 /// Eight cells with one table.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
@@ -52,85 +52,106 @@ pub unsafe fn multiply(
 ) {
     match simd {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: `Simd::Avx2` comes from `Simd::detect` only; the rest is the caller's promise.
-        Simd::Avx2 => unsafe {
-            if weights.is_empty() {
-                avx2::multiply::<false>(batches, weights, table, x, y);
-            } else {
-                avx2::multiply::<true>(batches, weights, table, x, y);
-            }
-        },
+        // SAFETY: these come from `Simd::detect` only; the rest is the caller's promise.
+        Simd::Avx2 => unsafe { avx2::multiply(batches, weights, table, x, y) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Simd::Avx512 => unsafe { avx512::multiply(batches, weights, table, x, y) },
         // SAFETY: the caller's promise.
-        _ => unsafe {
-            if weights.is_empty() {
-                multiply_with::<Lanes, false>(batches, weights, table, x, y);
-            } else {
-                multiply_with::<Lanes, true>(batches, weights, table, x, y);
-            }
-        },
+        _ => unsafe { multiply_some::<Lanes, 1>(batches, weights, table, x, y) },
     }
 }
 
+/// Products of as many batches as come in runs of N.
+///
 /// # Safety
 /// As for [`multiply`].
 #[inline(always)]
-unsafe fn multiply_with<V: Vector8, const HANGING: bool>(
+unsafe fn multiply_some<V: Batched<N>, const N: usize>(
     batches: &[SectorBatch],
     weights: &[HangingWeights],
     table: &TableLanes,
     x: &[Padded],
     y: &mut [Padded],
 ) {
+    let batches = batches.as_chunks().0;
+    // SAFETY: the caller's promise.
+    unsafe {
+        if weights.is_empty() {
+            multiply_with::<V, N, false>(batches, &[], table, x, y);
+        } else {
+            multiply_with::<V, N, true>(batches, weights.as_chunks().0, table, x, y);
+        }
+    }
+}
+
+/// # Safety
+/// As for [`multiply`].
+#[inline(always)]
+unsafe fn multiply_with<V: Batched<N>, const N: usize, const HANGING: bool>(
+    batches: &[[SectorBatch; N]],
+    weights: &[[HangingWeights; N]],
+    table: &TableLanes,
+    x: &[Padded],
+    y: &mut [Padded],
+) {
     for (b, batch) in batches.iter().enumerate() {
-        prefetch::<V, _>(batches, b + AHEAD);
+        prefetch::<V, _>(batches, b + AHEAD / N);
         if HANGING {
-            prefetch::<V, _>(weights, b + AHEAD);
+            prefetch::<V, _>(weights, b + AHEAD / N);
         }
         // Rotations act on components, all other steps on slots: they commute.
         // SAFETY: the caller's promise.
-        let mut u: Corners<V> = unsafe { gather(x, &batch.nodes) };
-        to_cell(&mut u, &batch.rotation);
+        let mut u: Corners<V> = unsafe { gather(x, batch, |batch| &batch.nodes) };
+        let R = read_matrix(batch, |batch| &batch.rotation);
+        to_cell(&mut u, &R);
         if HANGING {
-            interpolate(&mut u, &weights[b]);
+            interpolate(&mut u, &read_weights(&weights[b]));
         }
         transform(&mut u);
         multiply_sectors(&mut u, table);
         transform(&mut u);
         if HANGING {
-            distribute(&mut u, &weights[b]);
+            distribute(&mut u, &read_weights(&weights[b]));
         }
-        from_cell(&mut u, &batch.rotation);
-        // SAFETY: the caller's promise.
-        unsafe { scatter(y, &batch.nodes, &u) };
+        from_cell(&mut u, &R);
+        for k in 0..N {
+            // SAFETY: the caller's promise.
+            unsafe { scatter(y, &batch[k].nodes, &part_of(&u, k)) };
+        }
     }
 }
 
 /// Asks for an entry that is needed soon, if there is one.
 #[inline(always)]
-fn prefetch<V: Vector8, T>(entries: &[T], at: usize) {
+fn prefetch<V: Vector, T>(entries: &[T], at: usize) {
     if let Some(entry) = entries.get(at) {
         V::prefetch(entry);
     }
 }
 
-// Loops instead of closures below: see `Vector8`.
+// Loops instead of closures below: see `Vector`. Closures that only name a field are none of those.
 
 /// # Safety
 /// All local numbers are below the length of `x`.
 #[inline(always)]
-pub unsafe fn gather<V: Vector8>(x: &[Padded], nodes: &[Ids; 8]) -> Corners<V> {
+pub unsafe fn gather<V: Batched<N>, const N: usize, B>(
+    x: &[Padded],
+    from: &[B; N],
+    nodes: impl Fn(&B) -> &[Ids; 8],
+) -> Corners<V> {
     // Written out: a loop over slots would keep everything in memory.
     // SAFETY: the caller's promise.
     let [a, b, c, d, e, f, g, h] = unsafe {
         [
-            V::gather(x, &nodes[0]),
-            V::gather(x, &nodes[1]),
-            V::gather(x, &nodes[2]),
-            V::gather(x, &nodes[3]),
-            V::gather(x, &nodes[4]),
-            V::gather(x, &nodes[5]),
-            V::gather(x, &nodes[6]),
-            V::gather(x, &nodes[7]),
+            V::gather_all(x, from, |batch| &nodes(batch)[0]),
+            V::gather_all(x, from, |batch| &nodes(batch)[1]),
+            V::gather_all(x, from, |batch| &nodes(batch)[2]),
+            V::gather_all(x, from, |batch| &nodes(batch)[3]),
+            V::gather_all(x, from, |batch| &nodes(batch)[4]),
+            V::gather_all(x, from, |batch| &nodes(batch)[5]),
+            V::gather_all(x, from, |batch| &nodes(batch)[6]),
+            V::gather_all(x, from, |batch| &nodes(batch)[7]),
         ]
     };
     [
@@ -150,10 +171,22 @@ pub unsafe fn scatter<V: Vector8>(y: &mut [Padded], nodes: &[Ids; 8], f: &Corner
     });
 }
 
+/// The corners of one batch.
+#[inline(always)]
+pub fn part_of<V: Batched<N>, const N: usize>(u: &Corners<V>, batch: usize) -> Corners<V::Part> {
+    let mut out = [[V::Part::splat(0.0); 8]; 3];
+    for i in 0..3 {
+        for_eight!(j => {
+            out[i][j] = u[i][j].part(batch);
+        });
+    }
+    out
+}
+
 /// W: displacements of the corners from those of the vertices.
 #[inline(always)]
-pub fn interpolate<V: Vector8>(u: &mut Corners<V>, weights: &HangingWeights) {
-    let [w1, w2, w4, w3, w5, w6] = load_weights::<V>(weights);
+pub fn interpolate<V: Vector>(u: &mut Corners<V>, weights: &[V; 6]) {
+    let [w1, w2, w4, w3, w5, w6] = *weights;
     let minus_three = V::splat(-3.0);
     for i in 0..3 {
         let [v0, v1, v2, v3, v4, v5, v6, v7] = u[i];
@@ -173,8 +206,8 @@ pub fn interpolate<V: Vector8>(u: &mut Corners<V>, weights: &HangingWeights) {
 
 /// Wᵀ: forces on the vertices from those on the corners.
 #[inline(always)]
-pub fn distribute<V: Vector8>(f: &mut Corners<V>, weights: &HangingWeights) {
-    let [w1, w2, w4, w3, w5, w6] = load_weights::<V>(weights);
+pub fn distribute<V: Vector>(f: &mut Corners<V>, weights: &[V; 6]) {
+    let [w1, w2, w4, w3, w5, w6] = *weights;
     let minus_three = V::splat(-3.0);
     for i in 0..3 {
         let [g0, g1, g2, g3, g4, g5, g6, g7] = f[i];
@@ -193,15 +226,19 @@ pub fn distribute<V: Vector8>(f: &mut Corners<V>, weights: &HangingWeights) {
     }
 }
 
+/// Weights of every batch.
 #[inline(always)]
-fn load_weights<V: Vector8>(weights: &HangingWeights) -> [V; 6] {
-    let [a, b, c, d, e, f] = weights;
-    [V::load(a), V::load(b), V::load(c), V::load(d), V::load(e), V::load(f)]
+pub fn read_weights<V: Batched<N>, const N: usize>(weights: &[HangingWeights; N]) -> [V; 6] {
+    let mut out = [V::splat(0.0); 6];
+    for k in 0..6 {
+        out[k] = V::read(weights, |weights| &weights[k]);
+    }
+    out
 }
 
 /// û_p = Σ_j (−1)^{|j & p|} u_j, in place.
 #[inline(always)]
-pub fn transform<V: Vector8>(u: &mut Corners<V>) {
+pub fn transform<V: Vector>(u: &mut Corners<V>) {
     for i in 0..3 {
         let [a, b, c, d, e, f, g, h] = u[i];
         let (a, b, c, d) = (a + b, a - b, c + d, c - d);
@@ -214,8 +251,8 @@ pub fn transform<V: Vector8>(u: &mut Corners<V>) {
 
 /// √c R̂ᵀ u.
 #[inline(always)]
-pub fn to_cell<V: Vector8>(u: &mut Corners<V>, R: &Mat3<Lanes>) {
-    let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = load_matrix::<V>(R);
+pub fn to_cell<V: Vector>(u: &mut Corners<V>, R: &Mat3<V>) {
+    let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = *R;
     for_eight!(p => {
         let (x, y, z) = (u[0][p], u[1][p], u[2][p]);
         u[0][p] = xx.mul_add(x, yx.mul_add(y, zx * z));
@@ -226,8 +263,8 @@ pub fn to_cell<V: Vector8>(u: &mut Corners<V>, R: &Mat3<Lanes>) {
 
 /// √c R̂ f.
 #[inline(always)]
-pub fn from_cell<V: Vector8>(f: &mut Corners<V>, R: &Mat3<Lanes>) {
-    let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = load_matrix::<V>(R);
+pub fn from_cell<V: Vector>(f: &mut Corners<V>, R: &Mat3<V>) {
+    let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = *R;
     for_eight!(p => {
         let (x, y, z) = (f[0][p], f[1][p], f[2][p]);
         f[0][p] = xx.mul_add(x, xy.mul_add(y, xz * z));
@@ -236,28 +273,26 @@ pub fn from_cell<V: Vector8>(f: &mut Corners<V>, R: &Mat3<Lanes>) {
     });
 }
 
+/// The rotation of every batch.
 #[inline(always)]
-fn load_matrix<V: Vector8>(R: &Mat3<Lanes>) -> Mat3<V> {
-    [
-        V::load(&R[0]),
-        V::load(&R[1]),
-        V::load(&R[2]),
-        V::load(&R[3]),
-        V::load(&R[4]),
-        V::load(&R[5]),
-        V::load(&R[6]),
-        V::load(&R[7]),
-        V::load(&R[8]),
-    ]
+pub fn read_matrix<V: Batched<N>, const N: usize, B>(
+    from: &[B; N],
+    field: impl Fn(&B) -> &Mat3<Lanes>,
+) -> Mat3<V> {
+    let mut out = [V::splat(0.0); 9];
+    for i in 0..9 {
+        out[i] = V::read(from, |batch| &field(batch)[i]);
+    }
+    out
 }
 
 /// S û.
 #[inline(always)]
-pub fn multiply_sectors<V: Vector8>(u: &mut Corners<V>, table: &TableLanes) {
+pub fn multiply_sectors<V: Batched<N>, const N: usize>(u: &mut Corners<V>, table: &TableLanes) {
     for_eight!(q => {
         let [xx, xy, xz, yy, yz, zz] = &table.0[q];
-        let (xx, xy, xz) = (V::load(xx), V::load(xy), V::load(xz));
-        let (yy, yz, zz) = (V::load(yy), V::load(yz), V::load(zz));
+        let (xx, xy, xz) = (V::shared(xx), V::shared(xy), V::shared(xz));
+        let (yy, yz, zz) = (V::shared(yy), V::shared(yz), V::shared(zz));
         let (a, b, c) = (u[0][q ^ 1], u[1][q ^ 2], u[2][q ^ 4]);
         u[0][q ^ 1] = xx.mul_add(a, xy.mul_add(b, xz * c));
         u[1][q ^ 2] = xy.mul_add(a, yy.mul_add(b, yz * c));
@@ -275,7 +310,7 @@ mod avx2 {
     /// # Safety
     /// As for [`super::multiply`].
     #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn multiply<const HANGING: bool>(
+    pub unsafe fn multiply(
         batches: &[SectorBatch],
         weights: &[HangingWeights],
         table: &TableLanes,
@@ -283,6 +318,35 @@ mod avx2 {
         y: &mut [Padded],
     ) {
         // SAFETY: the caller's promise.
-        unsafe { super::multiply_with::<Register, HANGING>(batches, weights, table, x, y) };
+        unsafe { super::multiply_some::<Register, 1>(batches, weights, table, x, y) };
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx512 {
+    //! The same loop for two batches at once; one that is left over takes AVX2.
+
+    use super::{HangingWeights, Padded, SectorBatch, TableLanes};
+    use crate::element::avx2::Register;
+    use crate::element::avx512::Register512;
+
+    /// # Safety
+    /// As for [`super::multiply`].
+    #[target_feature(enable = "avx512f,avx2,fma")]
+    pub unsafe fn multiply(
+        batches: &[SectorBatch],
+        weights: &[HangingWeights],
+        table: &TableLanes,
+        x: &[Padded],
+        y: &mut [Padded],
+    ) {
+        // SAFETY: the caller's promise.
+        unsafe { super::multiply_some::<Register512, 2>(batches, weights, table, x, y) };
+        if batches.len() % 2 == 1 {
+            let (batches, weights) =
+                (&batches[batches.len() - 1..], &weights[weights.len().saturating_sub(1)..]);
+            // SAFETY: the caller's promise.
+            unsafe { super::multiply_some::<Register, 1>(batches, weights, table, x, y) };
+        }
     }
 }

@@ -45,8 +45,8 @@ pub unsafe fn add(
 ) {
     match simd {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: `Simd::Avx2` comes from `Simd::detect` only; the rest is the caller's promise.
-        Simd::Avx2 => unsafe { avx2::add(batches, hanging, table, rows) },
+        // SAFETY: both come from `Simd::detect` only; the rest is the caller's promise.
+        Simd::Avx2 | Simd::Avx512 => unsafe { avx2::add(batches, hanging, table, rows) },
         // SAFETY: the caller's promise.
         _ => unsafe { add_with::<Lanes>(batches, hanging, table, rows) },
     }
@@ -155,8 +155,8 @@ unsafe fn add_plain<V: Vector8>(R: &[[V; 3]; 3], B: &[f32; 6], nodes: &[Ids; 8],
 pub unsafe fn add_stored(simd: Simd, batches: &[StoredBatch], rows: &mut [Block6]) {
     match simd {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: `Simd::Avx2` comes from `Simd::detect` only; the rest is the caller's promise.
-        Simd::Avx2 => unsafe { avx2::add_stored(batches, rows) },
+        // SAFETY: both come from `Simd::detect` only; the rest is the caller's promise.
+        Simd::Avx2 | Simd::Avx512 => unsafe { avx2::add_stored(batches, rows) },
         // SAFETY: the caller's promise.
         _ => unsafe { add_stored_with::<Lanes>(batches, rows) },
     }

@@ -208,8 +208,7 @@ impl CellChunk {
     pub fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
         match self.batches.get(batch) {
             Some(b) => {
-                let inverse = 1.0 / b.root.0[lane];
-                let R = Matrix3::from_fn(|i, j| b.rotation[3 * i + j].0[lane] * inverse);
+                let R = Matrix3::from_fn(|i, j| b.rotation[3 * i + j].0[lane] / b.root.0[lane]);
                 turned(&R, self.lanes[batch].octants[lane])
             }
             None => Matrix3::identity(),

@@ -2,8 +2,13 @@
 
 #![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
 
+use std::array::from_ref;
+
 use super::super::Padded;
-use super::batch::{Corners, HangingWeights, distribute, from_cell, gather, interpolate, scatter, to_cell};
+use super::batch::{
+    Corners, HangingWeights, distribute, from_cell, gather, interpolate, read_matrix, read_weights, scatter,
+    to_cell,
+};
 use super::sectors::Matrix24;
 use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8};
 
@@ -62,8 +67,8 @@ pub unsafe fn multiply(
 ) {
     match simd {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: `Simd::Avx2` comes from `Simd::detect` only; the rest is the caller's promise.
-        Simd::Avx2 => unsafe { avx2::multiply(batches, weights, x, y) },
+        // SAFETY: both come from `Simd::detect` only; the rest is the caller's promise.
+        Simd::Avx2 | Simd::Avx512 => unsafe { avx2::multiply(batches, weights, x, y) },
         // SAFETY: the caller's promise.
         _ => unsafe { multiply_with::<Lanes>(batches, weights, x, y) },
     }
@@ -80,10 +85,12 @@ unsafe fn multiply_with<V: Vector8>(
 ) {
     for (b, batch) in batches.iter().enumerate() {
         // SAFETY: the caller's promise.
-        let mut u: Corners<V> = unsafe { gather(x, &batch.nodes) };
-        to_cell(&mut u, &batch.rotation);
-        if let Some(weights) = weights.get(b) {
-            interpolate(&mut u, weights);
+        let mut u: Corners<V> = unsafe { gather(x, from_ref(batch), |batch| &batch.nodes) };
+        let R = read_matrix(from_ref(batch), |batch| &batch.rotation);
+        to_cell(&mut u, &R);
+        let weights = weights.get(b).map(from_ref);
+        if let Some(weights) = weights {
+            interpolate(&mut u, &read_weights(weights));
         }
         let (mut v, mut f) = ([V::splat(0.0); 24], [V::splat(0.0); 24]);
         for j in 0..8 {
@@ -122,10 +129,10 @@ unsafe fn multiply_with<V: Vector8>(
                 u[i][j] = f[3 * j + i];
             }
         }
-        if let Some(weights) = weights.get(b) {
-            distribute(&mut u, weights);
+        if let Some(weights) = weights {
+            distribute(&mut u, &read_weights(weights));
         }
-        from_cell(&mut u, &batch.rotation);
+        from_cell(&mut u, &R);
         // SAFETY: the caller's promise.
         unsafe { scatter(y, &batch.nodes, &u) };
     }

@@ -9,11 +9,11 @@ use super::super::chunks::NO_PIECE;
 use super::super::{Padded, padded};
 use super::batch::{
     Corners, HangingWeights, SectorBatch, TableLanes, distribute, from_cell, interpolate, multiply_sectors,
-    scatter, to_cell, transform,
+    part_of, read_matrix, read_weights, scatter, to_cell, transform,
 };
 use super::chunk::{BatchLanes, CellChunk, Table};
 use super::lane::{CellMatrix, handedness};
-use crate::element::{LANES, Lanes, Mat3, Simd, Vector8, for_eight, polar_newton, polar_rotation};
+use crate::element::{Batched, LANES, Lanes, Mat3, Simd, Vector8, for_eight, polar_newton, polar_rotation};
 use crate::octree::{At, Lattice};
 
 /// What only an update needs of a chunk.
@@ -134,50 +134,63 @@ struct Part<'a> {
 unsafe fn update(simd: Simd, part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
     match simd {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: `Simd::Avx2` comes from `Simd::detect` only; the rest is the caller's promise.
+        // SAFETY: these come from `Simd::detect` only; the rest is the caller's promise.
         Simd::Avx2 => unsafe { avx2::update(part, x, f) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Simd::Avx512 => unsafe { avx512::update(part, x, f) },
         // SAFETY: the caller's promise.
-        _ => unsafe { update_with::<Lanes>(part, x, f) },
+        _ => unsafe { update_with::<Lanes, 1>(part, 0, x, f) },
     }
 }
 
+/// The batches from number `first` on, as many as come in runs of N.
+///
 /// # Safety
 /// As for [`update`].
 #[inline(always)]
-unsafe fn update_with<V: Vector8>(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
+unsafe fn update_with<V: Batched<N>, const N: usize>(
+    part: &mut Part<'_>,
+    first: usize,
+    x: &[[f64; 4]],
+    f: &mut [Padded],
+) -> usize {
     let mut inverted = 0;
-    for b in 0..part.batches.len() {
-        let (batch, side) = (&mut part.batches[b], &part.sides[b]);
+    let batches = part.batches[first..].as_chunks_mut().0;
+    let (lanes, sides) = (part.lanes[first..].as_chunks().0, part.sides[first..].as_chunks().0);
+    let weights = part.weights.get(first..).unwrap_or_default().as_chunks().0;
+    for (b, ((batch, lanes), side)) in batches.iter_mut().zip(lanes).zip(sides).enumerate() {
         let mut u: Corners<V> = [[V::splat(0.0); 8]; 3];
         for_eight!(j => {
             if j > 0 {
                 // SAFETY: the caller's promise.
-                let edge = unsafe { V::gather_edges(x, &batch.nodes[0], &batch.nodes[j]) };
+                let edge = unsafe { V::gather_all_edges(x, batch, |batch| [&batch.nodes[0], &batch.nodes[j]]) };
                 (u[0][j], u[1][j], u[2][j]) = (edge[0], edge[1], edge[2]);
             }
         });
-        let weights = part.weights.get(b);
+        let weights: Option<&[HangingWeights; N]> = weights.get(b);
         if let Some(weights) = weights {
-            interpolate(&mut u, weights);
+            interpolate(&mut u, &read_weights(weights));
         }
         transform(&mut u);
         // F̂ = δ F D: column k is the difference across axis k.
-        let inverse = V::load(&side.inverse);
+        let inverse = V::read(side, |side: &RestBatch| &side.inverse);
         let mut F = [inverse; 9];
         for i in 0..3 {
             for k in 0..3 {
                 F[3 * i + k] = inverse * u[i][1 << k];
             }
         }
-        inverted += rotate(&F, batch, &part.lanes[b]);
+        inverted += rotate(&F, batch, lanes);
         // R̂ᵀ x − X in the frame of the cell, then as in a product.
-        to_cell(&mut u, &batch.rotation);
-        let rest = V::load(&batch.root) * V::load(&side.span);
+        let R = read_matrix(batch, |batch| &batch.rotation);
+        to_cell(&mut u, &R);
+        let rest = V::read(batch, |batch| &batch.root) * V::read(side, |side| &side.span);
         for k in 0..3 {
             u[k][1 << k] = u[k][1 << k] + rest;
         }
         multiply_sectors(&mut u, part.table);
-        from_cell(&mut u, &batch.rotation);
+        from_cell(&mut u, &R);
         let per_scale = V::splat(part.per_scale);
         for i in 0..3 {
             for p in 0..8 {
@@ -186,31 +199,41 @@ unsafe fn update_with<V: Vector8>(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [
         }
         transform(&mut u);
         if let Some(weights) = weights {
-            distribute(&mut u, weights);
+            distribute(&mut u, &read_weights(weights));
         }
-        // SAFETY: the caller's promise.
-        unsafe { scatter(f, &batch.nodes, &u) };
+        for k in 0..N {
+            // SAFETY: the caller's promise.
+            unsafe { scatter(f, &batch[k].nodes, &part_of(&u, k)) };
+        }
     }
     inverted
 }
 
 /// Updates the rotation of every used lane; returns how many have det F ≤ 0.
 #[inline(always)]
-fn rotate<V: Vector8>(F: &Mat3<V>, batch: &mut SectorBatch, lanes: &BatchLanes) -> usize {
+fn rotate<V: Batched<N>, const N: usize>(
+    F: &Mat3<V>,
+    batches: &mut [SectorBatch; N],
+    lanes: &[BatchLanes; N],
+) -> usize {
     let (R, trusted) = polar_newton(F);
-    let root = V::load(&batch.root);
+    let root = V::read(batches, |batch| &batch.root);
     // Lanes that Newton's method cannot handle are rare and leave the hot loop.
-    if trusted == u8::MAX {
+    if trusted == V::ALL {
         for i in 0..9 {
-            batch.rotation[i] = (root * R[i]).store();
+            (root * R[i]).write(batches, |batch| &mut batch.rotation[i]);
         }
         return 0;
     }
-    let (mut stored_F, mut stored_R) = ([Lanes::default(); 9], [Lanes::default(); 9]);
-    for i in 0..9 {
-        (stored_F[i], stored_R[i]) = (F[i].store(), (root * R[i]).store());
+    let mut inverted = 0;
+    for k in 0..N {
+        let (mut stored_F, mut stored_R) = ([Lanes::default(); 9], [Lanes::default(); 9]);
+        for i in 0..9 {
+            (stored_F[i], stored_R[i]) = (F[i].part(k).store(), (root * R[i]).part(k).store());
+        }
+        inverted += rotate_guarded(&stored_F, &stored_R, trusted >> (8 * k), &mut batches[k], &lanes[k]);
     }
-    rotate_guarded(&stored_F, &stored_R, trusted, batch, lanes)
+    inverted
 }
 
 #[cold]
@@ -218,7 +241,7 @@ fn rotate<V: Vector8>(F: &Mat3<V>, batch: &mut SectorBatch, lanes: &BatchLanes) 
 fn rotate_guarded(
     F: &Mat3<Lanes>,
     turned: &Mat3<Lanes>,
-    trusted: u8,
+    trusted: u16,
     batch: &mut SectorBatch,
     lanes: &BatchLanes,
 ) -> usize {
@@ -254,6 +277,27 @@ mod avx2 {
     #[target_feature(enable = "avx2,fma")]
     pub unsafe fn update(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
         // SAFETY: the caller's promise.
-        unsafe { super::update_with::<Register>(part, x, f) }
+        unsafe { super::update_with::<Register, 1>(part, 0, x, f) }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx512 {
+    //! The same loop for two batches at once; one that is left over takes AVX2.
+
+    use super::{Padded, Part};
+    use crate::element::avx2::Register;
+    use crate::element::avx512::Register512;
+
+    /// # Safety
+    /// As for [`super::update`].
+    #[target_feature(enable = "avx512f,avx2,fma")]
+    pub unsafe fn update(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
+        let pairs = part.batches.len() / 2 * 2;
+        // SAFETY: the caller's promise.
+        unsafe {
+            super::update_with::<Register512, 2>(part, 0, x, f)
+                + super::update_with::<Register, 1>(part, pairs, x, f)
+        }
     }
 }

@@ -3,7 +3,9 @@
 //! Rows and columns of the same components make a plane of 8×8 entries, whose columns are eight lanes. Rotations act
 //! on components and interpolation acts on vertices, so both work on whole columns of planes.
 //!
-//! Loops instead of closures in all that works on registers: see [`Vector8`].
+//! Loops instead of closures in all that works on registers: see [`Vector`](crate::element::Vector).
+
+use std::cmp::Ordering;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -206,13 +208,12 @@ impl Dense {
     /// Rows 3 c … 3 c + 2 of A u.
     #[inline]
     pub fn times_at(&self, c: usize, u: &[f32; 24]) -> [f32; 3] {
+        let u = by_components(u);
         [0, 1, 2].map(|i| {
             let mut sum = 0.0;
-            for j in 0..3 {
+            for (j, u) in u.iter().enumerate() {
                 let plane = &self.0[ENTRY[i][j]];
-                for b in 0..8 {
-                    sum += u[3 * b + j] * if i <= j { plane[b].0[c] } else { plane[c].0[b] };
-                }
+                sum += if i < j { dot(&plane.map(|column| column.0[c]), u) } else { dot(&plane[c].0, u) };
             }
             sum
         })
@@ -330,15 +331,18 @@ fn halve<V: Vector8>(columns: &mut Plane, octant: usize) {
 /// Columns times T.
 #[inline(always)]
 fn times_weights<V: Vector8>(columns: &Plane, T: &Weights) -> Plane {
-    let mut out = Plane::default();
-    for (column, row) in columns.iter().zip(T) {
-        let column = V::load(column);
-        for b in 0..8 {
-            if row[b] != 0.0 {
-                out[b] = V::splat(row[b]).mul_add(column, V::load(&out[b])).store();
-            }
-        }
+    let mut sums = [V::splat(0.0); 8];
+    for c in 0..8 {
+        let column = V::load(&columns[c]);
+        // Most weights are 0, but to find these would take longer.
+        for_eight!(b => {
+            sums[b] = V::splat(T[c][b]).mul_add(column, sums[b]);
+        });
     }
+    let mut out = *columns;
+    for_eight!(b => {
+        out[b] = sums[b].store();
+    });
     out
 }
 
@@ -351,7 +355,39 @@ pub fn times_packed(A: &Packed, u: &[f32; 24]) -> [f32; 24] {
 /// Rows 3 c … 3 c + 2 of A u of a packed matrix.
 #[inline]
 pub fn rows_packed(A: &Packed, c: usize, u: &[f32; 24]) -> [f32; 3] {
-    [0, 1, 2].map(|i| (0..24).map(|s| A[at(3 * c + i, s)] * u[s]).sum())
+    let u = by_components(u);
+    [0, 1, 2].map(|i| {
+        let mut sum = 0.0;
+        for (j, u) in u.iter().enumerate() {
+            let begin = BEGIN[ENTRY[i][j]];
+            for b in 0..8 {
+                let at = match i.cmp(&j) {
+                    Ordering::Less => LANES * b + c,
+                    Ordering::Equal => triangle(b.min(c), b.max(c)),
+                    Ordering::Greater => LANES * c + b,
+                };
+                sum += A[begin + at] * u[b];
+            }
+        }
+        sum
+    })
+}
+
+/// Component j of every vertex.
+#[inline(always)]
+fn by_components(u: &[f32; 24]) -> [[f32; 8]; 3] {
+    [0, 1, 2].map(|j| std::array::from_fn(|b| u[3 * b + j]))
+}
+
+#[inline(always)]
+fn dot(a: &[f32; 8], b: &[f32; 8]) -> f32 {
+    let p: [f32; 8] = std::array::from_fn(|k| a[k] * b[k]);
+    ((p[0] + p[4]) + (p[1] + p[5])) + ((p[2] + p[6]) + (p[3] + p[7]))
+}
+
+/// Place of entry (a, b), a ≤ b, of an upper triangle by columns.
+const fn triangle(a: usize, b: usize) -> usize {
+    b * (b + 1) / 2 + a
 }
 
 /// Place of entry (r, s) of a packed matrix.
@@ -359,8 +395,7 @@ pub const fn at(r: usize, s: usize) -> usize {
     let (a, i, b, j) = (r / 3, r % 3, s / 3, s % 3);
     let begin = BEGIN[ENTRY[i][j]];
     if i == j {
-        let (low, high) = if a < b { (a, b) } else { (b, a) };
-        begin + high * (high + 1) / 2 + low
+        begin + if a < b { triangle(a, b) } else { triangle(b, a) }
     } else if i < j {
         begin + LANES * b + a
     } else {

@@ -33,8 +33,8 @@ impl Context<'_> {
     pub fn refresh(&self, simd: Simd, stored: &mut [Stored], frame: &[Rotation], with: (Within, bool)) {
         match simd {
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
-            Simd::Avx2 => unsafe { avx2::refresh(self, stored, frame, with) },
+            // SAFETY: both come from `Simd::detect` only.
+            Simd::Avx2 | Simd::Avx512 => unsafe { avx2::refresh(self, stored, frame, with) },
             _ => self.refresh_all::<Lanes>(stored, frame, with),
         }
     }

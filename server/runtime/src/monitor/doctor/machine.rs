@@ -27,7 +27,8 @@ pub fn processor() -> Vec<Finding> {
 #[cfg(target_arch = "x86_64")]
 fn instructions() -> Finding {
     if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-        return Finding::ok("processor", "has AVX2 and FMA");
+        let wide = std::arch::is_x86_feature_detected!("avx512f");
+        return Finding::ok("processor", if wide { "has AVX-512" } else { "has AVX2 and FMA" });
     }
     let next = "Expect longer steps. In a virtual machine, pass the processor of the host through";
     Finding::warning("processor", "lacks AVX2 or FMA", next)

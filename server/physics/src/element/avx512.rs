@@ -1,0 +1,162 @@
+//! Two batches of eight lanes in one AVX-512 register.
+//!
+//! Arithmetic works on both batches at once. Rows are gathered and scattered as for one batch after the other, so all
+//! sums have the order, and the bits, that they have with AVX2.
+//!
+//! The functions here are inlined into kernels that enable AVX-512; only such kernels may use [`Register512`], which
+//! is why every `SAFETY` below can rely on it.
+
+#![allow(unsafe_code)] // vector instructions, reached only from functions that enable them
+
+use std::arch::x86_64::{
+    __m256, __m512, _CMP_GT_OQ, _MM_HINT_T0, _mm_prefetch, _mm256_castps_pd, _mm256_loadu_ps, _mm512_add_ps,
+    _mm512_broadcast_f64x4, _mm512_castpd_ps, _mm512_castps_pd, _mm512_castps_si512, _mm512_castps256_ps512,
+    _mm512_castps512_ps256, _mm512_castsi512_ps, _mm512_cmp_ps_mask, _mm512_div_ps, _mm512_extractf64x4_pd,
+    _mm512_fmadd_ps, _mm512_insertf64x4, _mm512_mask_blend_ps, _mm512_mul_ps, _mm512_set1_ps, _mm512_sqrt_ps,
+    _mm512_sub_ps, _mm512_xor_si512,
+};
+use std::ops::{Add, Mul, Neg, Sub};
+
+use super::avx2::Register;
+use super::lanes::{Batched, Ids, Lanes, Vector, Vector8};
+
+/// The lanes of two batches, for use only inside functions that enable AVX-512, AVX2 and FMA.
+#[derive(Clone, Copy, Debug)]
+#[repr(transparent)]
+pub struct Register512(__m512);
+
+macro_rules! lanewise {
+    ($trait:ident, $method:ident, $intrinsic:ident) => {
+        impl $trait for Register512 {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                // SAFETY: only reached from functions that enable AVX-512.
+                Self(unsafe { $intrinsic(self.0, other.0) })
+            }
+        }
+    };
+}
+lanewise!(Add, add, _mm512_add_ps);
+lanewise!(Sub, sub, _mm512_sub_ps);
+lanewise!(Mul, mul, _mm512_mul_ps);
+
+impl Neg for Register512 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        // SAFETY: only reached from functions that enable AVX-512.
+        Self(unsafe {
+            _mm512_castsi512_ps(_mm512_xor_si512(
+                _mm512_castps_si512(self.0),
+                _mm512_castps_si512(_mm512_set1_ps(-0.0)),
+            ))
+        })
+    }
+}
+
+impl Vector for Register512 {
+    const ALL: u16 = u16::MAX;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        // SAFETY: only reached from functions that enable AVX-512.
+        Self(unsafe { _mm512_set1_ps(value) })
+    }
+
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        // SAFETY: only reached from functions that enable AVX-512.
+        Self(unsafe { _mm512_fmadd_ps(self.0, b.0, c.0) })
+    }
+
+    #[inline(always)]
+    fn recip(self) -> Self {
+        // SAFETY: only reached from functions that enable AVX-512.
+        Self(unsafe { _mm512_div_ps(_mm512_set1_ps(1.0), self.0) })
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        // SAFETY: only reached from functions that enable AVX-512.
+        Self(unsafe { _mm512_sqrt_ps(self.0) })
+    }
+
+    #[inline(always)]
+    fn above(self, threshold: f32) -> u16 {
+        // SAFETY: only reached from functions that enable AVX-512.
+        unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, _mm512_set1_ps(threshold)) }
+    }
+
+    #[inline(always)]
+    fn with_second(self, other: Self) -> Self {
+        // SAFETY: only reached from functions that enable AVX-512.
+        Self(unsafe { _mm512_mask_blend_ps(0xFF00, self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn prefetch<T>(value: &T) {
+        for line in 0..size_of::<T>().div_ceil(64) {
+            // SAFETY: a hint, within the value.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>((&raw const *value).cast::<i8>().wrapping_add(64 * line)) };
+        }
+    }
+}
+
+impl Batched<2> for Register512 {
+    type Part = Register;
+
+    #[inline(always)]
+    fn read<B>(from: &[B; 2], field: impl Fn(&B) -> &Lanes) -> Self {
+        pair(Register::load(field(&from[0])), Register::load(field(&from[1])))
+    }
+
+    #[inline(always)]
+    fn shared(lanes: &Lanes) -> Self {
+        // SAFETY: 32 bytes of plain f32; only reached from functions that enable AVX-512.
+        Self(unsafe {
+            _mm512_castpd_ps(_mm512_broadcast_f64x4(_mm256_castps_pd(_mm256_loadu_ps(lanes.0.as_ptr()))))
+        })
+    }
+
+    #[inline(always)]
+    fn part(self, batch: usize) -> Register {
+        // SAFETY: only reached from functions that enable AVX-512.
+        Register(unsafe {
+            if batch == 0 {
+                _mm512_castps512_ps256(self.0)
+            } else {
+                std::mem::transmute::<std::arch::x86_64::__m256d, __m256>(_mm512_extractf64x4_pd::<1>(
+                    _mm512_castps_pd(self.0),
+                ))
+            }
+        })
+    }
+
+    #[inline(always)]
+    unsafe fn gather_all<B>(x: &[[f32; 4]], from: &[B; 2], ids: impl Fn(&B) -> &Ids) -> [Self; 3] {
+        // SAFETY: the caller's promise.
+        let ([a, b, c], [d, e, f]) =
+            unsafe { (Register::gather(x, ids(&from[0])), Register::gather(x, ids(&from[1]))) };
+        [pair(a, d), pair(b, e), pair(c, f)]
+    }
+
+    #[inline(always)]
+    unsafe fn gather_all_edges<B>(x: &[[f64; 4]], from: &[B; 2], ids: impl Fn(&B) -> [&Ids; 2]) -> [Self; 3] {
+        let ([first, second], [third, fourth]) = (ids(&from[0]), ids(&from[1]));
+        // SAFETY: the caller's promise.
+        let ([a, b, c], [d, e, f]) =
+            unsafe { (Register::gather_edges(x, first, second), Register::gather_edges(x, third, fourth)) };
+        [pair(a, d), pair(b, e), pair(c, f)]
+    }
+}
+
+/// The lanes of one batch, then those of another.
+#[inline(always)]
+fn pair(first: Register, second: Register) -> Register512 {
+    // SAFETY: only reached from functions that enable AVX-512.
+    Register512(unsafe {
+        let wide = _mm512_castps_pd(_mm512_castps256_ps512(first.0));
+        _mm512_castpd_ps(_mm512_insertf64x4::<1>(wide, _mm256_castps_pd(second.0)))
+    })
+}
