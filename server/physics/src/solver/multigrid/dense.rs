@@ -5,8 +5,6 @@
 //!
 //! Loops instead of closures in all that works on registers: see [`Vector`](crate::element::Vector).
 
-use std::cmp::Ordering;
-
 use nalgebra::{Matrix3, Vector3};
 
 use crate::element::{LANES, Lanes, Vector8, for_eight};
@@ -115,9 +113,14 @@ impl Dense {
         std::array::from_fn(|s| self.entry(r, s))
     }
 
+    /// All entries.
+    pub fn rows(&self) -> Rows {
+        std::array::from_fn(|r| self.row(r))
+    }
+
     /// The same in double precision.
     pub fn wide(&self) -> Matrix24 {
-        std::array::from_fn(|r| self.row(r).map(f64::from))
+        self.rows().map(|row| row.map(f64::from))
     }
 
     /// The same by planes below the diagonal.
@@ -196,27 +199,6 @@ impl Dense {
         for (column, other) in self.0.as_flattened_mut().iter_mut().zip(other.0.as_flattened()) {
             *column = (V::load(column) + V::load(other)).store();
         }
-    }
-
-    /// A u.
-    #[inline]
-    pub fn times(&self, u: &[f32; 24]) -> [f32; 24] {
-        let rows: [[f32; 3]; 8] = std::array::from_fn(|c| self.times_at(c, u));
-        std::array::from_fn(|r| rows[r / 3][r % 3])
-    }
-
-    /// Rows 3 c … 3 c + 2 of A u.
-    #[inline]
-    pub fn times_at(&self, c: usize, u: &[f32; 24]) -> [f32; 3] {
-        let u = by_components(u);
-        [0, 1, 2].map(|i| {
-            let mut sum = 0.0;
-            for (j, u) in u.iter().enumerate() {
-                let plane = &self.0[ENTRY[i][j]];
-                sum += if i < j { dot(&plane.map(|column| column.0[c]), u) } else { dot(&plane[c].0, u) };
-            }
-            sum
-        })
     }
 
     /// Block of vertices `a` and `b`.
@@ -346,44 +328,42 @@ fn times_weights<V: Vector8>(columns: &Plane, T: &Weights) -> Plane {
     out
 }
 
+/// All entries of a matrix, row by row: what sweeps over vertices read.
+pub type Rows = [[f32; 24]; 24];
+
+/// A u.
+#[inline]
+pub fn times(A: &Rows, u: &[f32; 24]) -> [f32; 24] {
+    A.map(|row| row.iter().zip(u).map(|(a, u)| a * u).sum())
+}
+
+/// Rows 3 c … 3 c + 2 of A u.
+#[inline]
+pub fn times_at(A: &Rows, c: usize, u: &[f32; 24]) -> [f32; 3] {
+    [0, 1, 2].map(|i| A[3 * c + i].iter().zip(u).map(|(a, u)| a * u).sum())
+}
+
 /// A u of a packed matrix.
 #[inline]
 pub fn times_packed(A: &Packed, u: &[f32; 24]) -> [f32; 24] {
-    Dense::unpacked(A).times(u)
+    times(&Dense::unpacked(A).rows(), u)
 }
 
 /// Rows 3 c … 3 c + 2 of A u of a packed matrix.
 #[inline]
 pub fn rows_packed(A: &Packed, c: usize, u: &[f32; 24]) -> [f32; 3] {
-    let u = by_components(u);
-    [0, 1, 2].map(|i| {
-        let mut sum = 0.0;
-        for (j, u) in u.iter().enumerate() {
-            let begin = BEGIN[ENTRY[i][j]];
-            for b in 0..8 {
-                let at = match i.cmp(&j) {
-                    Ordering::Less => LANES * b + c,
-                    Ordering::Equal => triangle(b.min(c), b.max(c)),
-                    Ordering::Greater => LANES * c + b,
-                };
-                sum += A[begin + at] * u[b];
-            }
-        }
-        sum
-    })
+    [0, 1, 2].map(|i| PLACES[3 * c + i].iter().zip(u).map(|(&at, u)| A[usize::from(at)] * u).sum())
 }
 
-/// Component j of every vertex.
-#[inline(always)]
-fn by_components(u: &[f32; 24]) -> [[f32; 8]; 3] {
-    [0, 1, 2].map(|j| std::array::from_fn(|b| u[3 * b + j]))
-}
-
-#[inline(always)]
-fn dot(a: &[f32; 8], b: &[f32; 8]) -> f32 {
-    let p: [f32; 8] = std::array::from_fn(|k| a[k] * b[k]);
-    ((p[0] + p[4]) + (p[1] + p[5])) + ((p[2] + p[6]) + (p[3] + p[7]))
-}
+/// Places of all entries in a packed matrix, row by row.
+pub const PLACES: [[u16; 24]; 24] = {
+    let (mut places, mut k) = ([[0; 24]; 24], 0);
+    while k < 576 {
+        places[k / 24][k % 24] = at(k / 24, k % 24) as u16;
+        k += 1;
+    }
+    places
+};
 
 /// Place of entry (a, b), a ≤ b, of an upper triangle by columns.
 const fn triangle(a: usize, b: usize) -> usize {
@@ -465,9 +445,10 @@ mod tests {
         let A = matrix();
         let u: [f32; 24] = std::array::from_fn(|r| (r as f32 * 0.9).cos());
         let expected = exact(&A) * SMatrix::<f64, 24, 1>::from_fn(|r, _| u[r].into());
-        for (r, (a, b)) in A.times(&u).into_iter().zip(times_packed(&A.packed(), &u)).enumerate() {
+        for (r, (a, b)) in times(&A.rows(), &u).into_iter().zip(times_packed(&A.packed(), &u)).enumerate() {
             let rows = rows_packed(&A.packed(), r / 3, &u);
-            for found in [a, b, rows[r % 3]] {
+            let own = times_at(&A.rows(), r / 3, &u);
+            for found in [a, b, rows[r % 3], own[r % 3]] {
                 assert!((f64::from(found) - expected[r]).abs() < 1e-4);
             }
         }

@@ -11,7 +11,7 @@
 use nalgebra::{Matrix3, Rotation3};
 
 use super::carried::Carried;
-use super::dense::Dense;
+use super::dense::{Dense, Rows};
 use super::hierarchy::Hierarchy;
 use super::level::NONE;
 use super::matrices::{
@@ -50,6 +50,15 @@ pub struct Coefficients {
     pub mass_factor: f64,
 }
 
+impl Coefficients {
+    /// Whether the lumped masses times their factor are those of `other`.
+    fn has_mass_of(&self, other: &Self) -> bool {
+        let [own, others] =
+            [self, other].map(|of| of.materials.iter().map(|material| material.density_kg_m3));
+        self.mass_factor == other.mass_factor && own.eq(others)
+    }
+}
+
 /// What an update of the operators changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Updated {
@@ -67,6 +76,8 @@ pub struct Galerkin {
     pub levels: Vec<LevelMatrices>,
     /// Matrix of every kind of cell; for leaves without mass.
     pub shared: Vec<Dense>,
+    /// The same, row by row.
+    pub(super) rows: Vec<Rows>,
     /// The same in the corners of a parent.
     pub(super) carried: Carried,
     /// Mass [kg] times its factor of an eighth of a leaf of every kind.
@@ -119,10 +130,16 @@ impl Galerkin {
         let anew = self.coefficients.as_ref() != Some(with);
         let mut released = false;
         if anew {
+            let same_fixed = fixed.iter().map(|f| (f.copy, f.held)).eq(self.known_fixed.iter().copied());
+            let same_mass =
+                same_fixed && self.coefficients.as_ref().is_some_and(|known| known.has_mass_of(with));
             self.known_fixed.clear();
             self.known_fixed.extend(fixed.iter().map(|f| (f.copy, f.held)));
             self.mark_held(hierarchy);
             self.set_coefficients(hierarchy, with);
+            if !same_mass {
+                self.sum_masses(hierarchy);
+            }
         } else if !self.is_made_for(with, fixed) {
             released = self.hold(hierarchy, fixed);
         }
@@ -184,9 +201,10 @@ impl Galerkin {
         self.hold_coarse(hierarchy);
     }
 
-    /// Computes shared matrices and lumped masses.
+    /// Computes shared matrices.
     fn set_coefficients(&mut self, hierarchy: &Hierarchy, with: &Coefficients) {
         self.shared.clear();
+        self.rows.clear();
         self.eighth.clear();
         self.add_kinds(hierarchy, with);
         let (shared, eighth) = (&self.shared, &self.eighth);
@@ -194,6 +212,14 @@ impl Galerkin {
             let kind = hierarchy.kind_of[l][id] as usize;
             shared_matrix(&hierarchy.levels[l], id, &shared[kind], eighth[kind])
         });
+        match &mut self.coefficients {
+            Some(known) => known.clone_from(with),
+            None => self.coefficients = Some(with.clone()),
+        }
+    }
+
+    /// Sums the lumped masses of leaves at the vertices.
+    fn sum_masses(&mut self, hierarchy: &Hierarchy) {
         for (l, level) in hierarchy.levels.iter().enumerate().filter(|(_, level)| level.has_slots()) {
             let mass = &mut self.levels[l].mass;
             mass.fill(0.0);
@@ -209,10 +235,6 @@ impl Galerkin {
                 }
             }
         }
-        match &mut self.coefficients {
-            Some(known) => known.clone_from(with),
-            None => self.coefficients = Some(with.clone()),
-        }
     }
 
     /// Computes shared matrices of the kinds that have none yet.
@@ -225,7 +247,9 @@ impl Galerkin {
             let mass = with.mass_factor * material.density_kg_m3 * side.powi(3);
             let K = unit_stiffness(material.lame);
             let M = (kind.merged > 0).then(|| table::merged_mass(kind.merged));
-            self.shared.push(table::cube(&K, with.scale * side, M.as_ref(), mass));
+            let cube = table::cube(&K, with.scale * side, M.as_ref(), mass);
+            self.rows.push(cube.rows());
+            self.shared.push(cube);
             self.eighth.push((mass / 8.0) as f32);
         }
     }

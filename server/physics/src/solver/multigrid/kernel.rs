@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::dense::at;
+use super::dense::PLACES;
 use super::follow::LevelChange;
 use super::galerkin::Galerkin;
 use super::level::Level;
@@ -19,12 +19,12 @@ use crate::team::{Team, blocks};
 const DIAGONAL: [usize; 3] = [0, 4, 6];
 
 /// Places in a packed matrix of the entries of the upper triangle, row by row.
-const PLACES: [u16; STORED] = {
+const UPPER: [u16; STORED] = {
     let (mut places, mut r) = ([0; STORED], 0);
     while r < 24 {
         let mut s = r;
         while s < 24 {
-            places[stored_entry(r, s)] = at(r, s) as u16;
+            places[stored_entry(r, s)] = PLACES[r][s];
             s += 1;
         }
         r += 1;
@@ -138,7 +138,7 @@ impl LevelKernel {
                 return false;
             }
             let packed = &matrices.stored[place as usize].matrix;
-            entries.iter_mut().zip(PLACES).for_each(|(entry, at)| *entry = packed[usize::from(at)]);
+            entries.iter_mut().zip(UPPER).for_each(|(entry, at)| *entry = packed[usize::from(at)]);
             true
         });
     }

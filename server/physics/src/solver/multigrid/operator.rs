@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::dense::{Dense, rows_packed, times_packed};
+use super::dense::{Rows, at, rows_packed, times, times_at, times_packed};
 use super::galerkin::Galerkin;
 use super::level::Level;
 use super::matrices::{CellMatrix, LevelMatrices};
@@ -32,13 +32,13 @@ pub struct LevelOperator<'a> {
     /// Their matrices.
     pub matrices: &'a LevelMatrices,
     /// Matrices of kinds of cells.
-    pub shared: &'a [Dense],
+    pub shared: &'a [Rows],
 }
 
 impl Galerkin {
     /// The operator of level `l`. On the finest level prescribed directions are not filtered out.
     pub fn operator<'a>(&'a self, level: &'a Level, l: usize) -> LevelOperator<'a> {
-        LevelOperator { level, matrices: &self.levels[l], shared: &self.shared }
+        LevelOperator { level, matrices: &self.levels[l], shared: &self.rows }
     }
 }
 
@@ -77,7 +77,7 @@ impl LevelOperator<'_> {
             }
             CellMatrix::Shared(kind) => {
                 self.interpolate(id, &mut u);
-                self.shared[kind as usize].times(&into_frame(&R, &u))
+                times(&self.shared[kind as usize], &into_frame(&R, &u))
             }
         };
         let mut f = out_of_frame(&R, &f);
@@ -134,7 +134,7 @@ impl LevelOperator<'_> {
         let u = into_frame(&R, &self.level.vertices[id].map(|v| x[v as usize]));
         let f = match self.matrices.matrix[id] {
             CellMatrix::Stored(place) => rows_packed(&self.matrices.stored[place as usize].matrix, c, &u),
-            CellMatrix::Shared(kind) => self.shared[kind as usize].times_at(c, &u),
+            CellMatrix::Shared(kind) => times_at(&self.shared[kind as usize], c, &u),
         };
         (R * Vector3::from(f)).into()
     }
@@ -163,12 +163,12 @@ impl LevelOperator<'_> {
             let block = match self.matrices.matrix[id] {
                 CellMatrix::Stored(place) => {
                     let A = &self.matrices.stored[place as usize].matrix;
-                    Matrix3::from_fn(|i, j| A[super::dense::at(3 * c + i, 3 * c + j)])
+                    Matrix3::from_fn(|i, j| A[at(3 * c + i, 3 * c + j)])
                 }
                 CellMatrix::Shared(kind) => {
                     let A = &self.shared[kind as usize];
                     if hanging == 0 {
-                        A.block(c, c)
+                        block_of(A, c, c)
                     } else {
                         let mut weights = [0.0; 8];
                         weights[c] = f32::from(u8::from(hanging >> c & 1 == 0));
@@ -180,7 +180,7 @@ impl LevelOperator<'_> {
                         let mut block = Matrix3::zeros();
                         for (a, wa) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
                             for (b, wb) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-                                block += A.block(a, b) * (wa * wb);
+                                block += block_of(A, a, b) * (wa * wb);
                             }
                         }
                         block
@@ -224,6 +224,11 @@ impl Iterator for Between {
         }
         None
     }
+}
+
+/// Block of vertices `a` and `b`.
+fn block_of(A: &Rows, a: usize, b: usize) -> Matrix3<f32> {
+    Matrix3::from_fn(|i, j| A[3 * a + i][3 * b + j])
 }
 
 #[inline]
