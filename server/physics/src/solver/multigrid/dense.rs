@@ -334,7 +334,12 @@ pub type Rows = [[f32; 24]; 24];
 /// A u.
 #[inline]
 pub fn times(A: &Rows, u: &[f32; 24]) -> [f32; 24] {
-    A.map(|row| row.iter().zip(u).map(|(a, u)| a * u).sum())
+    let mut out = [0.0; 24];
+    // Symmetric: rows are columns, and sums of columns need not wait for each other.
+    for (column, u) in A.iter().zip(u) {
+        out.iter_mut().zip(column).for_each(|(out, a)| *out += u * a);
+    }
+    out
 }
 
 /// Rows 3 c … 3 c + 2 of A u.

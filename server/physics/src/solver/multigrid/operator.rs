@@ -118,7 +118,10 @@ impl LevelOperator<'_> {
         let mass = self.matrices.mass[v];
         let mut sum = [0, 1, 2].map(|k| mass * x[v][k]);
         for (id, c) in self.level.slots_of(v) {
-            let part = if self.level.hanging[id] != 0 {
+            // Stored matrices are over the vertices themselves, whether corners hang or not.
+            let interpolates =
+                self.level.hanging[id] != 0 && matches!(self.matrices.matrix[id], CellMatrix::Shared(_));
+            let part = if interpolates {
                 let [a, b, d, _] = self.product(id, x)[c];
                 [a, b, d]
             } else {
