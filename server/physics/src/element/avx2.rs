@@ -224,17 +224,10 @@ unsafe fn pair(low: __m128, high: __m128) -> __m256 {
 /// Transposes pairs of rows (0 | 4), (1 | 5), (2 | 6), (3 | 7) of four numbers into their first three
 /// columns.
 #[inline(always)]
-unsafe fn columns([r04, r15, r26, r37]: [__m256; 4]) -> [Register; 3] {
+unsafe fn columns(rows: [__m256; 4]) -> [Register; 3] {
     // SAFETY: only reached from functions that enable AVX2.
-    unsafe {
-        let (xy01, xy23) = (_mm256_unpacklo_ps(r04, r15), _mm256_unpacklo_ps(r26, r37));
-        let (zw01, zw23) = (_mm256_unpackhi_ps(r04, r15), _mm256_unpackhi_ps(r26, r37));
-        [
-            Register(_mm256_shuffle_ps::<0x44>(xy01, xy23)),
-            Register(_mm256_shuffle_ps::<0xEE>(xy01, xy23)),
-            Register(_mm256_shuffle_ps::<0x44>(zw01, zw23)),
-        ]
-    }
+    let [x, y, z, _] = unsafe { quarters(rows) };
+    [Register(x), Register(y), Register(z)]
 }
 
 /// Transposes each half of four rows: of row k, entries k and k + 4 of all four.
@@ -257,17 +250,7 @@ unsafe fn quarters([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
 #[inline(always)]
 unsafe fn rows(x: __m256, y: __m256, z: __m256) -> [__m256; 4] {
     // SAFETY: only reached from functions that enable AVX2.
-    unsafe {
-        let w = _mm256_setzero_ps();
-        let (xy0145, xy2367) = (_mm256_unpacklo_ps(x, y), _mm256_unpackhi_ps(x, y));
-        let (zw0145, zw2367) = (_mm256_unpacklo_ps(z, w), _mm256_unpackhi_ps(z, w));
-        [
-            _mm256_shuffle_ps::<0x44>(xy0145, zw0145),
-            _mm256_shuffle_ps::<0xEE>(xy0145, zw0145),
-            _mm256_shuffle_ps::<0x44>(xy2367, zw2367),
-            _mm256_shuffle_ps::<0xEE>(xy2367, zw2367),
-        ]
-    }
+    unsafe { quarters([x, y, z, _mm256_setzero_ps()]) }
 }
 
 #[cfg(test)]

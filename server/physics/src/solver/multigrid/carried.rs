@@ -1,9 +1,8 @@
 //! Matrices of children in the corners of their parents, which most children of one kind and place share.
 
-use super::dense::Dense;
+use super::dense::{Dense, Weights};
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE, place_in, trilinear};
-use super::table::Weights;
 use crate::element::Lanes;
 use crate::octree::Cell;
 

@@ -11,7 +11,8 @@ use crate::element::{LANES, Lanes, Vector8, for_eight};
 use crate::operator::Held;
 use crate::operator::cells::{ENTRY, Matrix24};
 
-use super::table::Weights;
+/// Row c: weights of the new vertices in vertex c.
+pub type Weights = [[f32; 8]; 8];
 
 /// Entries of a packed matrix.
 pub const PACKED: usize = 300;
@@ -390,10 +391,11 @@ pub const fn at(r: usize, s: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use std::array::from_fn;
+
     use nalgebra::{Rotation3, SMatrix};
 
     use super::super::level::trilinear;
-    use super::super::table::child_weights;
     use super::*;
 
     type Exact = SMatrix<f64, 24, 24>;
@@ -429,7 +431,8 @@ mod tests {
         let turned = Q * exact(&A) * Q.transpose();
         assert_near(&A.rotated::<Lanes>(&turn.map(|q| q as f32)), &turned);
         for octant in 0..8 {
-            let T = child_weights(octant);
+            let T: Weights =
+                from_fn(|c| trilinear([0, 1, 2].map(|k| ((octant >> k & 1) + (c >> k & 1)) as i32)));
             let full = Exact::from_fn(|r, s| if r % 3 == s % 3 { T[r / 3][s / 3].into() } else { 0.0 });
             assert_near(&A.carried::<Lanes>(&T), &(full.transpose() * exact(&A) * full));
             let mut sum = matrix();

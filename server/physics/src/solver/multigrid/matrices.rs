@@ -2,10 +2,9 @@
 
 use nalgebra::UnitQuaternion;
 
-use super::dense::{Dense, Packed};
+use super::dense::{Dense, Packed, Weights};
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
-use super::table::Weights;
 use super::thin::{Inner, Passed};
 use crate::element::Lanes;
 use crate::octree::{Cell, corner_weights};

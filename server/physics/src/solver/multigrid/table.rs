@@ -1,10 +1,7 @@
 //! The matrices of cubes: stiffness by exact integration, and the mass of merged leaves.
 
-use super::dense::Dense;
+use super::dense::{Dense, Weights};
 use super::level::trilinear;
-
-/// Row c: coefficients of the corners.
-pub type Weights = [[f32; 8]; 8];
 
 /// The mass of a cube of mass 1 whose lumped leaves were merged `merged` times: one scalar for every two corners.
 ///
