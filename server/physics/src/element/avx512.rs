@@ -9,7 +9,7 @@
 #![allow(unsafe_code)] // vector instructions, reached only from functions that enable them
 
 use std::arch::x86_64::{
-    __m256, __m512, _CMP_GT_OQ, _MM_HINT_T0, _mm_prefetch, _mm256_castps_pd, _mm256_loadu_ps, _mm512_add_ps,
+    __m512, _CMP_GT_OQ, _mm256_castpd_ps, _mm256_castps_pd, _mm256_loadu_ps, _mm512_add_ps,
     _mm512_broadcast_f64x4, _mm512_castpd_ps, _mm512_castps_pd, _mm512_castps_si512, _mm512_castps256_ps512,
     _mm512_castps512_ps256, _mm512_castsi512_ps, _mm512_cmp_ps_mask, _mm512_div_ps, _mm512_extractf64x4_pd,
     _mm512_fmadd_ps, _mm512_insertf64x4, _mm512_mask_blend_ps, _mm512_mul_ps, _mm512_set1_ps, _mm512_sqrt_ps,
@@ -96,10 +96,7 @@ impl Vector for Register512 {
 
     #[inline(always)]
     fn prefetch<T>(value: &T) {
-        for line in 0..size_of::<T>().div_ceil(64) {
-            // SAFETY: a hint, within the value.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>((&raw const *value).cast::<i8>().wrapping_add(64 * line)) };
-        }
+        Register::prefetch(value);
     }
 }
 
@@ -126,9 +123,7 @@ impl Batched<2> for Register512 {
             if batch == 0 {
                 _mm512_castps512_ps256(self.0)
             } else {
-                std::mem::transmute::<std::arch::x86_64::__m256d, __m256>(_mm512_extractf64x4_pd::<1>(
-                    _mm512_castps_pd(self.0),
-                ))
+                _mm256_castpd_ps(_mm512_extractf64x4_pd::<1>(_mm512_castps_pd(self.0)))
             }
         })
     }

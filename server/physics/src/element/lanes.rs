@@ -328,7 +328,7 @@ impl Neg for Lanes {
 }
 
 /// Repeats a block for the numbers 0 … 7. The compiler leaves a loop with so long a body rolled, and then keeps
-/// all corners in memory to index them.
+/// the arrays that it indexes in memory.
 macro_rules! for_eight {
     ($k:ident => $body:block) => {
         for_eight!($k => $body, 0 1 2 3 4 5 6 7)

@@ -1,4 +1,4 @@
-//! Rotations of eight deformation gradients at once, for the ordinary case det F > 0.
+//! Rotations of eight or sixteen deformation gradients at once, for the ordinary case det F > 0.
 
 use super::Vector;
 
