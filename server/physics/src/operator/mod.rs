@@ -30,7 +30,7 @@ pub use rows::Sum;
 pub use stiff_modes::{NearPiece, StiffModes, degenerate_elements};
 pub use stiffness::{Direction, ElasticUpdate, OperatorChoice, Place, Stiffness, apply};
 pub use substitution::{Substitutable, Substitution};
-pub use system::{FixedCopy, Spring, SystemOperator, filter};
+pub use system::{FixedCopy, Spring, SystemOperator, filter, filter_block};
 
 use crate::storage::saved::saved_as;
 use crate::team::{Team, blocks};
@@ -45,9 +45,18 @@ saved_as!(saved_stiffness, Box, Stiffness, Tets(Elastic), Cells(CellStiffness));
 pub const BLOCK: usize = 256;
 
 /// A symmetric linear map on vectors with one [`Padded`] entry per copy.
-pub trait LinearOperator {
+pub trait LinearOperator: Sync {
     /// y = A x. Both slices have one entry per copy.
     fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]);
+
+    /// First half of a product with `x`; `false`, and nothing is done, if this operator computes products only as a whole.
+    fn start(&mut self, _team: &mut Team, _x: &[Padded]) -> bool {
+        false
+    }
+
+    /// Second half: y = A x of the copies of block number `block`, where `x` has the entries of that block, too. So a
+    /// caller uses a product where it is made, without a vector for it.
+    fn finish(&self, _block: usize, _x: &[Padded], _y: &mut [Padded]) {}
 
     /// p ← z + β p (z if β = 0), q = A p, and pᵀq: the use of A in a conjugate-gradient iteration.
     ///

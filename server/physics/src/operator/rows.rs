@@ -87,6 +87,51 @@ pub fn advance_solution(
     sum.total()
 }
 
+/// What a step of a Chebyshev smoother starts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// x = 0.
+    Zero,
+    /// x, to which the correction in d is added first.
+    Correction,
+    /// The step before.
+    Step,
+}
+
+/// d ← keep d + gain M r, x ← x + β d. A [start](Start) other than a step sets d anew.
+#[inline]
+pub fn smooth(
+    M: &[Inverse3],
+    r: &[Padded],
+    (start, [keep, gain, beta]): (Start, [f32; 3]),
+    [d, x]: [&mut [Padded]; 2],
+) {
+    #[cfg(target_arch = "x86_64")]
+    let done = if std::arch::is_x86_feature_detected!("avx") {
+        // SAFETY: the instructions were detected.
+        unsafe { avx::smooth(M, r, (start, [keep, gain, beta]), [d, x]) }
+    } else {
+        0
+    };
+    #[cfg(not(target_arch = "x86_64"))]
+    let done = 0;
+    for i in done..x.len() {
+        let z = M[i].times(&r[i]);
+        for k in 0..4 {
+            let next = match start {
+                Start::Step => keep * d[i][k] + gain * z[k],
+                Start::Zero | Start::Correction => gain * z[k],
+            };
+            x[i][k] = match start {
+                Start::Zero => beta * next,
+                Start::Correction => (x[i][k] + d[i][k]) + beta * next,
+                Start::Step => x[i][k] + beta * next,
+            };
+            d[i][k] = next;
+        }
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 mod avx {
     //! The same operations with two rows in a register. Each function returns the number of rows it has
@@ -99,7 +144,7 @@ mod avx {
         _mm256_storeu_pd, _mm256_storeu_ps, _mm256_sub_ps,
     };
 
-    use super::{Inverse3, Padded, Sum};
+    use super::{Inverse3, Padded, Start, Sum};
 
     #[target_feature(enable = "avx")]
     pub fn advance_direction(
@@ -147,15 +192,7 @@ mod avx {
         for (((x, r), z), ((p, q), M)) in x.iter_mut().zip(r).zip(z).zip(p.iter().zip(q).zip(M)) {
             let next_x = _mm256_add_ps(load(x), _mm256_mul_ps(alpha, load(p)));
             let next_r = _mm256_sub_ps(load(r), _mm256_mul_ps(alpha, load(q)));
-            // (xx, xy, yy, 0) and (xz, yz, zz, 0); the first two columns are parts of both.
-            let upper = load_halves(&M[0].0[0], &M[1].0[0]);
-            let column_z = load_halves(&M[0].0[1], &M[1].0[1]);
-            let column_x = _mm256_shuffle_ps::<0b11_00_01_00>(upper, column_z);
-            let column_y = _mm256_shuffle_ps::<0b11_01_10_01>(upper, column_z);
-            let a = _mm256_mul_ps(column_x, _mm256_permute_ps::<0x00>(next_r));
-            let b = _mm256_mul_ps(column_y, _mm256_permute_ps::<0x55>(next_r));
-            let c = _mm256_mul_ps(column_z, _mm256_permute_ps::<0xAA>(next_r));
-            let next_z = _mm256_add_ps(_mm256_add_ps(a, b), c);
+            let next_z = times(M, next_r);
             store(x, next_x);
             store(r, next_r);
             store(z, next_z);
@@ -163,6 +200,50 @@ mod avx {
         }
         store_sum(sum, product);
         2 * x.len()
+    }
+
+    #[target_feature(enable = "avx")]
+    pub fn smooth(
+        M: &[Inverse3],
+        r: &[Padded],
+        (start, factors): (Start, [f32; 3]),
+        [d, x]: [&mut [Padded]; 2],
+    ) -> usize {
+        let [keep, gain, beta] = factors.map(|factor| _mm256_set1_ps(factor));
+        let (d, x) = (d.as_chunks_mut::<2>().0, x.as_chunks_mut::<2>().0);
+        let (r, M) = (r.as_chunks::<2>().0, M.as_chunks::<2>().0);
+        for ((d, x), (r, M)) in d.iter_mut().zip(&mut *x).zip(r.iter().zip(M)) {
+            let mut next = _mm256_mul_ps(gain, times(M, load(r)));
+            let known = match start {
+                Start::Zero => None,
+                Start::Correction => Some(_mm256_add_ps(load(x), load(d))),
+                Start::Step => {
+                    next = _mm256_add_ps(_mm256_mul_ps(keep, load(d)), next);
+                    Some(load(x))
+                }
+            };
+            let change = _mm256_mul_ps(beta, next);
+            match known {
+                Some(known) => store(x, _mm256_add_ps(known, change)),
+                None => store(x, change),
+            }
+            store(d, next);
+        }
+        2 * x.len()
+    }
+
+    /// M r of two rows.
+    #[target_feature(enable = "avx")]
+    fn times(M: &[Inverse3; 2], r: __m256) -> __m256 {
+        // (xx, xy, yy, 0) and (xz, yz, zz, 0); the first two columns are parts of both.
+        let upper = load_halves(&M[0].0[0], &M[1].0[0]);
+        let column_z = load_halves(&M[0].0[1], &M[1].0[1]);
+        let column_x = _mm256_shuffle_ps::<0b11_00_01_00>(upper, column_z);
+        let column_y = _mm256_shuffle_ps::<0b11_01_10_01>(upper, column_z);
+        let a = _mm256_mul_ps(column_x, _mm256_permute_ps::<0x00>(r));
+        let b = _mm256_mul_ps(column_y, _mm256_permute_ps::<0x55>(r));
+        let c = _mm256_mul_ps(column_z, _mm256_permute_ps::<0xAA>(r));
+        _mm256_add_ps(_mm256_add_ps(a, b), c)
     }
 
     #[target_feature(enable = "avx")]
@@ -329,6 +410,23 @@ mod tests {
             }
             assert_eq!((&x, &r), (&expected_x, &expected_r));
             assert_eq!(product.to_bits(), dot(&r, &z).to_bits());
+            for start in [Start::Zero, Start::Correction, Start::Step] {
+                let (d, x) = (rows(n, 10), rows(n, 11));
+                let (mut next_d, mut next_x) = (d.clone(), x.clone());
+                smooth(&M, &r, (start, [0.4, 0.7, 1.2]), [&mut next_d, &mut next_x]);
+                for i in 0..n {
+                    let z = M[i].times(&r[i]);
+                    for k in 0..4 {
+                        let (kept, known) = match start {
+                            Start::Zero => (0.0, 0.0),
+                            Start::Correction => (0.0, x[i][k] + d[i][k]),
+                            Start::Step => (0.4 * d[i][k], x[i][k]),
+                        };
+                        let next = kept + 0.7 * z[k];
+                        assert_eq!((next_d[i][k], next_x[i][k]), (next, known + 1.2 * next), "{start:?}");
+                    }
+                }
+            }
         }
     }
 }

@@ -46,15 +46,25 @@ pub struct SystemOperator<'a> {
 impl LinearOperator for SystemOperator<'_> {
     fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
         self.elastic.multiply(team, x);
-        let (elastic, mass, factor) = (&*self.elastic, self.mass, self.mass_factor);
-        team.for_blocks(blocks(y, BLOCK), |block, y| {
-            for (y, (x, &mass)) in y.iter_mut().zip(block_of(x, block).iter().zip(block_of(mass, block))) {
-                *y = x.map(|v| factor * mass * v);
-            }
-            elastic.add_products(block, y);
-        });
+        let A = &*self;
+        team.for_blocks(blocks(y, BLOCK), |block, y| A.without_springs(block, block_of(x, block), y));
         self.springs.iter().for_each(|spring| spring.add_to(x, y));
         filter(self.fixed, y);
+    }
+
+    fn start(&mut self, team: &mut Team, x: &[Padded]) -> bool {
+        debug_assert!(self.fixed.is_sorted_by_key(|f| f.copy));
+        // Springs join copies of any blocks.
+        let halves = self.springs.is_empty();
+        if halves {
+            self.elastic.multiply(team, x);
+        }
+        halves
+    }
+
+    fn finish(&self, block: usize, x: &[Padded], y: &mut [Padded]) {
+        self.without_springs(block, x, y);
+        filter_block(self.fixed, block, y);
     }
 
     fn advance(&mut self, team: &mut Team, beta: f32, z: &[Padded], out: Advance<'_>) -> f64 {
@@ -74,6 +84,16 @@ impl LinearOperator for SystemOperator<'_> {
 }
 
 impl SystemOperator<'_> {
+    /// y = A x of a block without springs and before prescribed directions are filtered out.
+    #[inline(always)]
+    fn without_springs(&self, block: usize, x: &[Padded], y: &mut [Padded]) {
+        let factor = self.mass_factor;
+        for (y, (x, &mass)) in y.iter_mut().zip(x.iter().zip(block_of(self.mass, block))) {
+            *y = x.map(|v| factor * mass * v);
+        }
+        self.elastic.add_products(block, y);
+    }
+
     /// Adds the springs to the diagonal blocks of (1 + hα) M + (h² + hβ) K̂, which gives those of A.
     pub fn add_springs(&self, diagonal: &mut [Block6]) {
         for spring in self.springs {
@@ -151,5 +171,14 @@ impl Spring {
 pub fn filter(fixed: &[FixedCopy], v: &mut [Padded]) {
     for copy in fixed {
         copy.held.clear_padded(&mut v[copy.copy as usize]);
+    }
+}
+
+/// The same of the entries `v` of block number `block`, where `fixed` is ascending.
+pub fn filter_block(fixed: &[FixedCopy], block: usize, v: &mut [Padded]) {
+    let (first, end) = (block * BLOCK, block * BLOCK + v.len());
+    let begin = fixed.partition_point(|f| (f.copy as usize) < first);
+    for copy in fixed[begin..].iter().take_while(|f| (f.copy as usize) < end) {
+        copy.held.clear_padded(&mut v[copy.copy as usize - first]);
     }
 }

@@ -298,6 +298,16 @@ impl LinearOperator for CellStiffness {
     fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
         apply(self, team, x, y);
     }
+
+    fn start(&mut self, team: &mut Team, x: &[Padded]) -> bool {
+        self.operator.multiply(team, x);
+        true
+    }
+
+    fn finish(&self, block: usize, _: &[Padded], y: &mut [Padded]) {
+        y.fill([0.0; 4]);
+        self.operator.add_products(block, y);
+    }
 }
 
 /// Parameters by number of region, from 1; region 0 has those of the body. Regions with the same λ/μ have one

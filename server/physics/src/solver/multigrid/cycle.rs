@@ -7,9 +7,9 @@ use super::coarsest::{Coarsest, CoarsestSolve};
 use super::follow::LevelChange;
 use super::galerkin::{Coefficients, Galerkin};
 use super::hierarchy::Hierarchy;
-use super::kernel::{LevelKernel, noise};
+use super::kernel::{LevelKernel, LevelSystem, noise};
 use super::matrices::CellMatrix;
-use super::smoother::{Diagonal, Smoother, Smoothing, chebyshev, gauss_seidel};
+use super::smoother::{Diagonal, Smoother, Smoothing, Stage, chebyshev, gauss_seidel, subtract};
 use super::stiff_springs::{Columns, SpringBlocks, Sprung};
 use crate::element::Simd;
 use crate::octree::Octree;
@@ -409,7 +409,6 @@ impl Multigrid {
         // Down: smooth, restrict the residual.
         for l in first..last {
             if l == first {
-                z.fill([0.0; 4]);
                 self.smooth(team, A, (l, inverse, largest), (r, z), true);
             } else {
                 self.smooth_inner(team, A, l, true);
@@ -428,10 +427,8 @@ impl Multigrid {
         for l in (first..last).rev() {
             let (fine, coarse) = self.levels.split_at_mut(l + 1);
             let transfer = &self.hierarchy.steps[l].transfer;
-            let d = &mut fine[l].d;
-            d.fill([0.0; 4]);
-            transfer.prolong(team, &coarse[0].x, d);
-            let e = &coarse[0].x;
+            let (e, d) = (&coarse[0].x, &mut fine[l].d);
+            transfer.prolong(team, e, d);
             self.galerkin.levels[l + 1].prolong_inner(team, &self.hierarchy.levels[l + 1], e, d);
             if l == first {
                 filter(&self.fixed, d);
@@ -445,9 +442,6 @@ impl Multigrid {
     fn smooth_inner(&mut self, team: &mut Team, A: &mut dyn LinearOperator, l: usize, before: bool) {
         let Vectors { x, b, inverse, .. } = &mut self.levels[l];
         let (mut x, b, inverse) = (std::mem::take(x), std::mem::take(b), std::mem::take(inverse));
-        if before {
-            x.fill([0.0; 4]);
-        }
         self.smooth(team, A, (l, &inverse, 0.0), (&b, &mut x), before);
         let level = &mut self.levels[l];
         (level.x, level.b, level.inverse) = (x, b, inverse);
@@ -466,43 +460,33 @@ impl Multigrid {
         let Self { settings, hierarchy, galerkin, levels, .. } = self;
         let operator = galerkin.operator(&hierarchy.levels[l], l);
         let Vectors { largest: known, r, d, q, kernel, columns, spring_blocks, .. } = &mut levels[l];
-        let largest = largest.max(*known);
-        let mass = &galerkin.levels[l].mass;
-        let columns = &*columns;
-        let mut multiply = |team: &mut Team, x: &[Padded], y: &mut [Padded]| match kernel {
-            Some(kernel) => {
-                kernel.apply(team, mass, x, y);
-                columns.add_to(x, y);
-            }
-            None => A.apply(team, x, y),
+        let (columns, mass) = (&*columns, &galerkin.levels[l].mass[..]);
+        let mut system = kernel.as_mut().map(|kernel| LevelSystem { kernel, mass, columns });
+        let A: &mut dyn LinearOperator = match &mut system {
+            Some(system) => system,
+            None => A,
         };
-        if before {
-            team.for_blocks(blocks(r, BLOCK), |block, r| r.copy_from_slice(block_of(b, block)));
-        } else {
-            let d = &*d;
-            team.for_blocks(blocks(x, BLOCK), |block, x| {
-                for (x, d) in x.iter_mut().zip(block_of(d, block)) {
-                    (0..4).for_each(|k| x[k] += d[k]);
-                }
-            });
-        }
         match settings.smoother {
             Smoother::Chebyshev { degree } => {
-                if !before {
-                    multiply(team, d, q);
-                    subtract(team, r, q);
-                }
                 let degree = u32::from(degree.clamp(1, 4));
-                let v = Smoothing { x, r, d, q };
                 let sprung = (!columns.is_empty()).then_some(Sprung { columns, blocks: spring_blocks });
-                let diagonal = Diagonal { inverse, largest, sprung };
-                chebyshev(team, &mut multiply, diagonal, degree, (v, before));
+                let diagonal = Diagonal { inverse, largest: largest.max(*known), sprung };
+                let stage = if before { Stage::Before } else { Stage::After };
+                chebyshev(team, A, diagonal, degree, (Smoothing { b, x, r, d, q }, stage));
             }
             Smoother::GaussSeidel { sweeps, omega } => {
+                if before {
+                    x.fill([0.0; 4]);
+                } else {
+                    for (x, d) in x.iter_mut().zip(&*d) {
+                        (0..4).for_each(|k| x[k] += d[k]);
+                    }
+                }
                 (0..sweeps).for_each(|_| gauss_seidel(&operator, inverse, b, x, omega));
                 if before {
-                    multiply(team, x, q);
-                    subtract(team, r, q);
+                    r.copy_from_slice(b);
+                    A.apply(team, x, q);
+                    subtract(r, q);
                 }
             }
         }
@@ -529,20 +513,16 @@ impl Multigrid {
         match coarsest.solve_kind() {
             CoarsestSolve::Cholesky => coarsest.solve(b, x),
             CoarsestSolve::Sweeps { degree } => {
-                x.fill([0.0; 4]);
-                r.copy_from_slice(b);
-                let mass = &galerkin.levels[last].mass;
-                let mut multiply = |team: &mut Team, x: &[Padded], y: &mut [Padded]| match kernel {
-                    Some(kernel) => {
-                        kernel.apply(team, mass, x, y);
-                        columns.add_to(x, y);
-                    }
-                    None => A.apply(team, x, y),
+                let mass = &galerkin.levels[last].mass[..];
+                let mut system = kernel.as_mut().map(|kernel| LevelSystem { kernel, mass, columns });
+                let A: &mut dyn LinearOperator = match &mut system {
+                    Some(system) => system,
+                    None => A,
                 };
                 let largest = known.max(if is_outer { largest } else { 0.0 });
-                let v = Smoothing { x, r, d, q };
                 let sprung = (!columns.is_empty()).then_some(Sprung { columns, blocks: spring_blocks });
-                chebyshev(team, &mut multiply, Diagonal { inverse, largest, sprung }, degree, (v, false));
+                let diagonal = Diagonal { inverse, largest, sprung };
+                chebyshev(team, A, diagonal, degree, (Smoothing { b, x, r, d, q }, Stage::Alone));
             }
         }
     }
@@ -604,12 +584,4 @@ impl Multigrid {
     pub fn largest_eigenvalue(&self) -> f64 {
         self.levels[self.first].largest
     }
-}
-
-fn subtract(team: &mut Team, r: &mut [Padded], q: &[Padded]) {
-    team.for_blocks(blocks(r, BLOCK), |block, r| {
-        for (r, q) in r.iter_mut().zip(block_of(q, block)) {
-            (0..4).for_each(|k| r[k] -= q[k]);
-        }
-    });
 }

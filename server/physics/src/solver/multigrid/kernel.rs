@@ -7,12 +7,13 @@ use super::follow::LevelChange;
 use super::galerkin::Galerkin;
 use super::level::Level;
 use super::matrices::{CellMatrix, LevelMatrices};
+use super::stiff_springs::Columns;
 use crate::element::Simd;
 use crate::operator::cells::{
     CellLane, CellMatrix as LaneMatrix, CellOperator, STORED, SectorTable, morton_order, slot_corners,
     slot_hanging, stored_entry,
 };
-use crate::operator::{BLOCK, Inverse3, Padded, block_of, invert, rows};
+use crate::operator::{BLOCK, Inverse3, LinearOperator, Padded, block_of, invert, rows};
 use crate::team::{Team, blocks};
 
 /// Places of xx, yy, zz in a block.
@@ -201,14 +202,53 @@ impl LevelKernel {
 
     /// y = A x, with the lumped `mass` of every vertex.
     pub fn apply(&mut self, team: &mut Team, mass: &[f32], x: &[Padded], y: &mut [Padded]) {
+        self.start(team, x);
+        let kernel = &*self;
+        team.for_blocks(blocks(y, BLOCK), |block, y| kernel.finish(block, mass, block_of(x, block), y));
+    }
+
+    /// First half of a product with `x`.
+    pub fn start(&mut self, team: &mut Team, x: &[Padded]) {
         self.operator.multiply(team, x);
-        let operator = &self.operator;
-        team.for_blocks(blocks(y, BLOCK), |block, y| {
-            for (y, (x, &mass)) in y.iter_mut().zip(block_of(x, block).iter().zip(block_of(mass, block))) {
-                *y = x.map(|x| mass * x);
-            }
-            operator.add_products(block, y);
-        });
+    }
+
+    /// Second half: y = A x of the vertices of block number `block`, where `x` has their entries.
+    #[inline]
+    pub fn finish(&self, block: usize, mass: &[f32], x: &[Padded], y: &mut [Padded]) {
+        for (y, (x, &mass)) in y.iter_mut().zip(x.iter().zip(block_of(mass, block))) {
+            *y = x.map(|x| mass * x);
+        }
+        self.operator.add_products(block, y);
+    }
+}
+
+/// The operator of a level, with its stiff springs.
+#[derive(Debug)]
+pub struct LevelSystem<'a> {
+    /// The cells.
+    pub kernel: &'a mut LevelKernel,
+    /// Lumped mass of every vertex.
+    pub mass: &'a [f32],
+    /// The springs.
+    pub columns: &'a Columns,
+}
+
+impl LinearOperator for LevelSystem<'_> {
+    fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
+        self.kernel.apply(team, self.mass, x, y);
+        self.columns.add_to(x, y);
+    }
+
+    fn start(&mut self, team: &mut Team, x: &[Padded]) -> bool {
+        let halves = self.columns.is_empty();
+        if halves {
+            self.kernel.start(team, x);
+        }
+        halves
+    }
+
+    fn finish(&self, block: usize, x: &[Padded], y: &mut [Padded]) {
+        self.kernel.finish(block, self.mass, x, y);
     }
 }
 

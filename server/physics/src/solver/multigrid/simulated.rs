@@ -21,7 +21,8 @@ use super::precondition::Cycle;
 use super::restricted::RestrictedSprings;
 use crate::octree::Octree;
 use crate::operator::{
-    BlockJacobi, FixedCopy, Held, LinearOperator, Padded, Preconditioner, Spring, filter, invert, invert_free,
+    BlockJacobi, FixedCopy, Held, LinearOperator, Padded, Preconditioner, Spring, filter, filter_block,
+    invert, invert_free,
 };
 use crate::team::Team;
 
@@ -71,6 +72,24 @@ impl LinearOperator for CompositeSystem<'_> {
         }
         self.springs.add_to(x, y);
         filter(self.held, y);
+    }
+
+    fn start(&mut self, team: &mut Team, x: &[Padded]) -> bool {
+        debug_assert!(self.held.is_sorted_by_key(|f| f.copy));
+        match self.kernel {
+            Some(kernel) if self.springs.is_empty() => {
+                kernel.start(team, x);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn finish(&self, block: usize, x: &[Padded], y: &mut [Padded]) {
+        if let Some(kernel) = &*self.kernel {
+            kernel.finish(block, self.mass, x, y);
+        }
+        filter_block(self.held, block, y);
     }
 }
 
@@ -271,7 +290,6 @@ impl Composite {
             let (fine, coarse) = levels.split_at_mut(l + 1);
             let d = if l + 1 == *first { d } else { &coarse[0].x };
             let u = if l == 0 { &mut *u } else { &mut fine[l].x[..] };
-            u.fill([0.0; 4]);
             hierarchy.steps[l].transfer.prolong(team, d, u);
         }
         filter(fixed, u);

@@ -7,11 +7,9 @@
 
 use super::operator::LevelOperator;
 use super::stiff_springs::Sprung;
-use crate::operator::{BLOCK, Inverse3, Padded, block_of};
+use crate::operator::rows::{self, Start};
+use crate::operator::{BLOCK, Inverse3, LinearOperator, Padded, block_of};
 use crate::team::{Team, blocks};
-
-/// y = A x.
-pub type Multiply<'a> = dyn FnMut(&mut Team, &[Padded], &mut [Padded]) + 'a;
 
 /// How a cycle smooths, before and after the correction by the coarser level.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -55,17 +53,30 @@ pub fn weight(degree: u32, i: u32) -> f32 {
 /// Vectors of a smoothing, one entry per vertex.
 #[derive(Debug)]
 pub struct Smoothing<'a> {
+    /// The right-hand side.
+    pub b: &'a [Padded],
     /// The solution.
     pub x: &'a mut [Padded],
-    /// Its residual.
+    /// The residual.
     pub r: &'a mut [Padded],
-    /// The last change of the solution, and what A makes of it.
+    /// The last change of the solution.
     pub d: &'a mut [Padded],
-    /// A d.
+    /// Room for a product with A.
     pub q: &'a mut [Padded],
 }
 
-/// What stands for the operator in a smoother.
+/// What is smoothed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// x from 0, and its residual: before the correction.
+    Before,
+    /// x with the residual r, after the correction d is added to it. Of r nothing is left.
+    After,
+    /// x from 0, without its residual: instead of a solution.
+    Alone,
+}
+
+/// What stands for the diagonal of the operator in a smoother.
 #[derive(Debug)]
 pub struct Diagonal<'a> {
     /// Inverses of the diagonal blocks of A. At the vertices of stiff springs they may have these or not.
@@ -76,51 +87,110 @@ pub struct Diagonal<'a> {
     pub sprung: Option<Sprung<'a>>,
 }
 
-/// Chebyshev steps from `x` with residual `r`. `multiply` is A. The last residual is computed if `residual` is
-/// set; otherwise `r` belongs to the iterate before.
+/// One step of a polynomial: its number from 0 on, what it starts from, and the factors of d, of D⁻¹r and of the new d in
+/// x.
+type Step = (Start, [f32; 3]);
+
+/// d ← (2k − 3)/(2k + 1) d + (8k − 4)/(2k + 1)/λ D⁻¹ r, x ← x + β d with k = `i` + 1.
+fn step(start: Start, i: u32, degree: u32, largest: f64) -> Step {
+    let k = f64::from(i) + 1.0;
+    let keep = if i == 0 { 0.0 } else { (2.0 * k - 3.0) / (2.0 * k + 1.0) };
+    let gain = (8.0 * k - 4.0) / (2.0 * k + 1.0) / largest;
+    (start, [keep as f32, gain as f32, weight(degree, i)])
+}
+
+/// Chebyshev steps for A x = b.
+///
+/// Products with A are subtracted from r, and make the next step, where they are computed: block by block.
 pub fn chebyshev(
     team: &mut Team,
-    multiply: &mut Multiply<'_>,
-    diagonal: Diagonal<'_>,
+    A: &mut dyn LinearOperator,
+    mut diagonal: Diagonal<'_>,
     degree: u32,
-    (v, residual): (Smoothing<'_>, bool),
+    (mut v, stage): (Smoothing<'_>, Stage),
 ) {
-    let Smoothing { x, r, d, q } = v;
-    let Diagonal { inverse, largest, mut sprung } = diagonal;
+    let largest = diagonal.largest;
+    let mut fresh = true;
     for i in 0..degree {
-        let k = f64::from(i) + 1.0;
-        // d ← (2k − 3)/(2k + 1) d + (8k − 4)/(2k + 1)/λ D⁻¹ r, x ← x + β d, r ← r − A d
-        let keep = if i == 0 { 0.0 } else { ((2.0 * k - 3.0) / (2.0 * k + 1.0)) as f32 };
-        let gain = ((8.0 * k - 4.0) / (2.0 * k + 1.0) / largest) as f32;
-        let beta = weight(degree, i);
-        let known = &*r;
-        team.for_blocks((blocks(d, BLOCK), blocks(x, BLOCK)), |block, (d, x)| {
-            let given = block_of(known, block).iter().zip(block_of(inverse, block));
-            for ((d, x), (r, M)) in d.iter_mut().zip(x).zip(given) {
-                let z = M.times(r);
+        let start = match (i, stage) {
+            (0, Stage::After) => Start::Correction,
+            (0, _) => Start::Zero,
+            _ => Start::Step,
+        };
+        let step = step(start, i, degree, largest);
+        if start == Start::Zero {
+            v.begin(team, step, &diagonal);
+        } else {
+            v.go_on(team, A, (stage != Stage::After && fresh, Some(step)), &diagonal);
+            fresh = false;
+        }
+        if let Some(Sprung { columns, blocks }) = &mut diagonal.sprung {
+            let r = if start == Start::Zero { v.b } else { &*v.r };
+            let (gain, beta) = (step.1[1], step.1[2]);
+            blocks.correct(columns, (diagonal.inverse, r), |at, z| {
                 for k in 0..4 {
-                    d[k] = if i == 0 { gain * z[k] } else { keep * d[k] + gain * z[k] };
-                    x[k] += beta * d[k];
+                    v.d[at][k] += gain * z[k];
+                    v.x[at][k] += beta * gain * z[k];
                 }
-            }
+            });
+        }
+    }
+    if stage == Stage::Before {
+        v.go_on(team, A, (fresh, None), &diagonal);
+    }
+}
+
+impl Smoothing<'_> {
+    /// The first step from x = 0, where the residual is b.
+    fn begin(&mut self, team: &mut Team, step: Step, diagonal: &Diagonal<'_>) {
+        let (b, inverse) = (self.b, diagonal.inverse);
+        let state = (blocks(self.d, BLOCK), blocks(self.x, BLOCK));
+        team.for_blocks(state, |block, (d, x)| {
+            rows::smooth(block_of(inverse, block), block_of(b, block), step, [d, x]);
         });
-        if let Some(Sprung { columns, blocks }) = &mut sprung {
-            blocks.correct(columns, (inverse, &*r), |v, z| {
-                for k in 0..4 {
-                    d[v][k] += gain * z[k];
-                    x[v][k] += beta * gain * z[k];
-                }
+    }
+
+    /// r ← r − A d, or b − A d if r is not `fresh` yet, and a `step` from there.
+    fn go_on(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        (fresh, step): (bool, Option<Step>),
+        diagonal: &Diagonal<'_>,
+    ) {
+        let Self { b, x, r, d, q, .. } = self;
+        let (b, inverse) = (&**b, diagonal.inverse);
+        let follow = |block: usize, q: &[Padded], [r, d, x]: [&mut [Padded]; 3]| {
+            if fresh {
+                r.copy_from_slice(block_of(b, block));
+            }
+            subtract(r, q);
+            if let Some(step) = step {
+                rows::smooth(block_of(inverse, block), r, step, [d, x]);
+            }
+        };
+        if A.start(team, d) {
+            let A = &*A;
+            let state = (blocks(r, BLOCK), blocks(d, BLOCK), blocks(x, BLOCK));
+            team.for_blocks(state, |block, (r, d, x)| {
+                let mut q = [[0.0; 4]; BLOCK];
+                let q = &mut q[..r.len()];
+                A.finish(block, d, q);
+                follow(block, q, [r, d, x]);
             });
+        } else {
+            A.apply(team, d, q);
+            let q = &**q;
+            let state = (blocks(r, BLOCK), blocks(d, BLOCK), blocks(x, BLOCK));
+            team.for_blocks(state, |block, (r, d, x)| follow(block, block_of(q, block), [r, d, x]));
         }
-        if i + 1 < degree || residual {
-            multiply(team, d, q);
-            let q = &*q;
-            team.for_blocks(blocks(r, BLOCK), |block, r| {
-                for (r, q) in r.iter_mut().zip(block_of(q, block)) {
-                    (0..4).for_each(|k| r[k] -= q[k]);
-                }
-            });
-        }
+    }
+}
+
+/// r ← r − q.
+pub fn subtract(r: &mut [Padded], q: &[Padded]) {
+    for (r, q) in r.iter_mut().zip(q) {
+        (0..4).for_each(|k| r[k] -= q[k]);
     }
 }
 

@@ -138,12 +138,11 @@ impl Transfer {
         self.rows.memory() + self.columns.memory()
     }
 
-    /// x += P e.
+    /// x = P e.
     pub fn prolong(&self, team: &mut Team, e: &[Padded], x: &mut [Padded]) {
         team.for_blocks(blocks(x, BLOCK), |block, x| {
             for (i, x) in x.iter_mut().enumerate() {
-                let sum = sum(self.rows.get(block * BLOCK + i), e);
-                (0..4).for_each(|k| x[k] += sum[k]);
+                *x = sum(self.rows.get(block * BLOCK + i), e);
             }
         });
     }
