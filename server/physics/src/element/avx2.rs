@@ -1,21 +1,21 @@
 //! Eight lanes in one AVX register.
 //!
-//! The functions here are inlined into kernels that enable AVX2 and FMA; only such kernels may use
-//! [`Register`], which is why every `SAFETY` below can rely on it.
+//! The functions here are inlined into kernels that enable AVX2 and FMA, and F16C if they read half precision;
+//! only such kernels may use [`Register`], which is why every `SAFETY` below can rely on it.
 
 #![allow(unsafe_code)] // vector instructions, reached only from functions that enable them
 
 use std::arch::x86_64::{
-    __m128, __m256, _CMP_GT_OQ, _MM_HINT_T0, _mm_add_ps, _mm_loadu_ps, _mm_prefetch, _mm_storeu_ps,
-    _mm256_add_ps, _mm256_castps128_ps256, _mm256_castps256_ps128, _mm256_cmp_ps, _mm256_cvtpd_ps,
-    _mm256_div_ps, _mm256_extractf128_ps, _mm256_fmadd_ps, _mm256_insertf128_ps, _mm256_loadu_pd,
-    _mm256_loadu_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps, _mm256_set1_ps,
-    _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_storeu_ps, _mm256_sub_pd, _mm256_sub_ps,
-    _mm256_unpackhi_ps, _mm256_unpacklo_ps, _mm256_xor_ps,
+    __m128, __m256, _CMP_GT_OQ, _MM_HINT_T0, _mm_add_ps, _mm_loadu_ps, _mm_loadu_si128, _mm_prefetch,
+    _mm_storeu_ps, _mm256_add_ps, _mm256_castps128_ps256, _mm256_castps256_ps128, _mm256_cmp_ps,
+    _mm256_cvtpd_ps, _mm256_cvtph_ps, _mm256_div_ps, _mm256_extractf128_ps, _mm256_fmadd_ps,
+    _mm256_insertf128_ps, _mm256_loadu_pd, _mm256_loadu_ps, _mm256_movemask_ps, _mm256_mul_ps,
+    _mm256_permute2f128_ps, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps,
+    _mm256_storeu_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps, _mm256_xor_ps,
 };
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::lanes::{Ids, Lanes, Vector, Vector8};
+use super::lanes::{Halves, Ids, Lanes, Vector, Vector8};
 
 /// Eight lanes in one AVX register, for use only inside functions that enable AVX2 and FMA.
 #[derive(Clone, Copy, Debug)]
@@ -99,6 +99,12 @@ impl Vector8 for Register {
     fn load(lanes: &Lanes) -> Self {
         // SAFETY: both are 32 bytes of plain f32.
         Self(unsafe { _mm256_loadu_ps(lanes.0.as_ptr()) })
+    }
+
+    #[inline(always)]
+    fn load_half(halves: &Halves) -> Self {
+        // SAFETY: 16 bytes; only reached from functions that enable F16C.
+        Self(unsafe { _mm256_cvtph_ps(_mm_loadu_si128(halves.0.as_ptr().cast())) })
     }
 
     #[inline(always)]

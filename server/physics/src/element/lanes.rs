@@ -13,6 +13,8 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
+use half::f16;
+
 /// Number of lanes.
 pub const LANES: usize = 8;
 
@@ -24,6 +26,14 @@ pub struct Lanes(
     pub [f32; LANES],
 );
 
+/// Eight numbers in half precision: eleven significant bits, magnitudes up to 65504.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[repr(C, align(16))]
+pub struct Halves(
+    /// Their bits.
+    pub [u16; LANES],
+);
+
 /// The instruction set that the kernels use.
 ///
 /// AVX2 contracts multiply-adds, so its results differ from those without it in the last bits. Each alone is
@@ -32,7 +42,7 @@ pub struct Lanes(
 pub enum Simd {
     /// Instructions that every machine of the architecture has. All such machines compute the same bits.
     Baseline,
-    /// AVX2 with fused multiply-add.
+    /// AVX2 with fused multiply-add and the conversion of half precision.
     Avx2,
     /// The same, and AVX-512 for kernels of which two batches fit into its registers.
     Avx512,
@@ -61,7 +71,10 @@ impl Simd {
     /// The best instruction set of this machine.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+        if std::arch::is_x86_feature_detected!("avx2")
+            && std::arch::is_x86_feature_detected!("fma")
+            && std::arch::is_x86_feature_detected!("f16c")
+        {
             return if std::arch::is_x86_feature_detected!("avx512f") { Simd::Avx512 } else { Simd::Avx2 };
         }
         Simd::Baseline
@@ -165,6 +178,8 @@ impl<V: Vector8> Batched<1> for V {
 pub trait Vector8: Vector {
     /// Reads eight numbers from memory.
     fn load(lanes: &Lanes) -> Self;
+    /// Reads eight numbers in half precision from memory.
+    fn load_half(halves: &Halves) -> Self;
     /// Writes eight numbers to memory.
     fn store(self) -> Lanes;
     /// The transpose of eight rows.
@@ -236,6 +251,10 @@ impl Vector8 for Lanes {
     #[inline(always)]
     fn load(lanes: &Lanes) -> Self {
         *lanes
+    }
+
+    fn load_half(halves: &Halves) -> Self {
+        Self(halves.0.map(|bits| f16::from_bits(bits).to_f32()))
     }
 
     #[inline(always)]

@@ -18,7 +18,7 @@ mod points;
 mod material_point;
 
 pub(crate) use lanes::for_eight;
-pub use lanes::{Batched, Ids, LANES, Lanes, Simd, Vector, Vector8};
+pub use lanes::{Batched, Halves, Ids, LANES, Lanes, Simd, Vector, Vector8};
 pub use material_point::{MOST_CARRIERS, MaterialPoint};
 pub use points::{Point, Points};
 pub use polar::polar_rotation;

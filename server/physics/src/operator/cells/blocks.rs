@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 use super::super::kernel::Block6;
 use super::batch::SectorBatch;
 use super::sectors::{ENTRY, Matrix24, SectorTable, diagonal_blocks};
-use super::stored::{StoredBatch, stored_entry};
+use super::stored::{Entry, StoredBatch, stored_entry};
 use crate::element::{Ids, LANES, Lanes, Simd, Vector8};
 
 /// Diagonal blocks (xx, xy, xz, yy, yz, zz) of a table in the frame of a cell, by the set of hanging slots.
@@ -152,25 +152,28 @@ unsafe fn add_plain<V: Vector8>(R: &[[V; 3]; 3], B: &[f32; 6], nodes: &[Ids; 8],
 ///
 /// # Safety
 /// All local numbers are below the length of `rows`.
-pub unsafe fn add_stored(simd: Simd, batches: &[StoredBatch], rows: &mut [Block6]) {
+pub unsafe fn add_stored<E: Entry>(simd: Simd, batches: &[StoredBatch<E>], rows: &mut [Block6]) {
     match simd {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: both come from `Simd::detect` only; the rest is the caller's promise.
         Simd::Avx2 | Simd::Avx512 => unsafe { avx2::add_stored(batches, rows) },
         // SAFETY: the caller's promise.
-        _ => unsafe { add_stored_with::<Lanes>(batches, rows) },
+        _ => unsafe { add_stored_with::<Lanes, E>(batches, rows) },
     }
 }
 
 /// # Safety
 /// As for [`add_stored`].
 #[inline(always)]
-unsafe fn add_stored_with<V: Vector8>(batches: &[StoredBatch], rows: &mut [Block6]) {
+unsafe fn add_stored_with<V: Vector8, E: Entry>(batches: &[StoredBatch<E>], rows: &mut [Block6]) {
     for batch in batches {
         let R: [[V; 3]; 3] = [load(&batch.rotation, 0), load(&batch.rotation, 1), load(&batch.rotation, 2)];
+        let scale = V::load(&batch.scale);
         for (j, ids) in batch.nodes.iter().enumerate() {
-            let entry = |r: usize, s: usize| batch.entries[stored_entry(3 * j + r, 3 * j + s)];
-            let B = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
+            let mut B = [Lanes::default(); 6];
+            for (B, (r, s)) in B.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
+                *B = (scale * batch.entries[stored_entry(3 * j + r, 3 * j + s)].load::<V>()).store();
+            }
             // SAFETY: the caller's promise.
             unsafe { V::scatter_blocks(rows, ids, turned(&R, &B)) };
         }
@@ -178,7 +181,7 @@ unsafe fn add_stored_with<V: Vector8>(batches: &[StoredBatch], rows: &mut [Block
 }
 
 /// The same of one lane whose slots `hanging` hang: blocks of R Wᵀ A W Rᵀ.
-pub fn add_stored_lane(batch: &StoredBatch, hanging: u8, lane: usize, rows: &mut [Block6]) {
+pub fn add_stored_lane<E: Entry>(batch: &StoredBatch<E>, hanging: u8, lane: usize, rows: &mut [Block6]) {
     let R = Matrix3::from_fn(|i, j| batch.rotation[3 * i + j].0[lane]);
     for ([xx, xy, xz, yy, yz, zz], ids) in rounded(&batch.matrix(lane), hanging).into_iter().zip(&batch.nodes)
     {
@@ -194,7 +197,7 @@ pub fn add_stored_lane(batch: &StoredBatch, hanging: u8, lane: usize, rows: &mut
 mod avx2 {
     //! The same loop compiled for AVX2 and FMA.
 
-    use super::{Block6, BlockTable, LANES, SectorBatch, StoredBatch};
+    use super::{Block6, BlockTable, Entry, LANES, SectorBatch, StoredBatch};
     use crate::element::avx2::Register;
 
     /// # Safety
@@ -212,9 +215,9 @@ mod avx2 {
 
     /// # Safety
     /// As for [`super::add_stored`].
-    #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn add_stored(batches: &[StoredBatch], rows: &mut [Block6]) {
+    #[target_feature(enable = "avx2,fma,f16c")]
+    pub unsafe fn add_stored<E: Entry>(batches: &[StoredBatch<E>], rows: &mut [Block6]) {
         // SAFETY: the caller's promise.
-        unsafe { super::add_stored_with::<Register>(batches, rows) };
+        unsafe { super::add_stored_with::<Register, E>(batches, rows) };
     }
 }

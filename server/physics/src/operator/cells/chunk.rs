@@ -15,8 +15,8 @@ use super::batch::{self, HangingWeights, SectorBatch, TableLanes};
 use super::blocks::{self, BlockTable};
 use super::lane::{CellLane, CellMatrix, HANGING_SLOTS, frame, turned};
 use super::sectors::hanging_slots;
-use super::stored::{self, STORED, StoredBatch};
-use crate::element::{LANES, Lanes, Simd};
+use super::stored::{self, Entry, STORED, StoredBatch};
+use crate::element::{Halves, LANES, Lanes, Simd};
 
 /// A table in the forms that the loops read.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -61,7 +61,9 @@ pub struct CellChunk {
     /// Batches with tables.
     pub batches: Vec<SectorBatch>,
     /// Batches with matrices of their own; their numbers follow.
-    pub stored: Vec<StoredBatch>,
+    pub stored: Vec<StoredBatch<Lanes>>,
+    /// Those in half precision, which come last.
+    pub half: Vec<StoredBatch<Halves>>,
     /// Cells of every batch.
     pub lanes: Vec<BatchLanes>,
     /// Sets of hanging slots in the order of `weights`.
@@ -87,6 +89,7 @@ impl CellChunk {
             groups: Vec::new(),
             batches: Vec::new(),
             stored: Vec::new(),
+            half: Vec::new(),
             lanes: Vec::new(),
             hanging: Vec::new(),
             weights: Vec::new(),
@@ -109,6 +112,7 @@ impl CellChunk {
         match matrix {
             CellMatrix::Table(_) => self.batches.reserve_exact(packed.len()),
             CellMatrix::Stored => self.stored.reserve_exact(packed.len()),
+            CellMatrix::Half => self.half.reserve_exact(packed.len()),
         }
         for lanes in packed {
             let mut batch = BatchLanes { cells: [NO_PIECE; LANES], octants: [0; LANES], hanging: [0; LANES] };
@@ -129,6 +133,7 @@ impl CellChunk {
             match matrix {
                 CellMatrix::Table(_) => self.batches.push(sectors),
                 CellMatrix::Stored => self.stored.push(StoredBatch::new(nodes)),
+                CellMatrix::Half => self.half.push(StoredBatch::new(nodes)),
             }
             if hangs {
                 self.weights.push(weights(&batch.hanging));
@@ -145,20 +150,20 @@ impl CellChunk {
     pub fn apply(&self, simd: Simd, tables: &[Table], y: &mut [Padded]) {
         let y = &mut y[..self.x.len()];
         y.fill([0.0; 4]);
-        let first_stored = self.batches.len();
         for group in &self.groups {
             let weights = &self.weights[group.weights.clone()];
-            let Range { start, end } = group.batches;
-            match group.matrix {
-                CellMatrix::Table(t) => {
-                    let (batches, table) = (&self.batches[start..end], &tables[usize::from(t)].lanes);
-                    // SAFETY: local numbers are indices into `vertices`, which is as long as `x` and `y`.
-                    unsafe { batch::multiply(simd, batches, weights, table, &self.x, y) }
-                }
-                CellMatrix::Stored => {
-                    let batches = &self.stored[start - first_stored..end - first_stored];
-                    // SAFETY: as above.
-                    unsafe { stored::multiply(simd, batches, weights, &self.x, y) }
+            let batches = self.in_list(group);
+            // SAFETY: local numbers are indices into `vertices`, which is as long as `x` and `y`.
+            unsafe {
+                match group.matrix {
+                    CellMatrix::Table(t) => {
+                        let table = &tables[usize::from(t)].lanes;
+                        batch::multiply(simd, &self.batches[batches], weights, table, &self.x, y);
+                    }
+                    CellMatrix::Stored => {
+                        stored::multiply(simd, &self.stored[batches], weights, &self.x, y);
+                    }
+                    CellMatrix::Half => stored::multiply(simd, &self.half[batches], weights, &self.x, y),
                 }
             }
         }
@@ -168,33 +173,48 @@ impl CellChunk {
     pub fn diagonals(&self, simd: Simd, tables: &[Table], rows: &mut [Block6]) {
         let rows = &mut rows[..self.x.len()];
         rows.fill([0.0; 8]);
-        let first_stored = self.batches.len();
         for group in &self.groups {
+            let hanging = &self.hanging[group.weights.clone()];
+            let batches = self.in_list(group);
             match group.matrix {
                 CellMatrix::Table(t) => {
-                    let hanging = &self.hanging[group.weights.clone()];
-                    let (batches, table) =
-                        (&self.batches[group.batches.clone()], &tables[usize::from(t)].blocks);
+                    let table = &tables[usize::from(t)].blocks;
                     // SAFETY: local numbers are indices into `vertices`, which is as long as `rows`.
-                    unsafe { blocks::add(simd, batches, hanging, table, rows) }
+                    unsafe { blocks::add(simd, &self.batches[batches], hanging, table, rows) }
                 }
-                CellMatrix::Stored if group.weights.is_empty() => {
-                    let Range { start, end } = group.batches;
-                    // SAFETY: as above.
-                    unsafe {
-                        blocks::add_stored(simd, &self.stored[start - first_stored..end - first_stored], rows)
-                    }
-                }
-                CellMatrix::Stored => {
-                    for b in group.batches.clone() {
-                        let (batch, lanes) = (&self.stored[b - first_stored], &self.lanes[b]);
-                        for lane in (0..LANES).filter(|&lane| lanes.cells[lane] != NO_PIECE) {
-                            blocks::add_stored_lane(batch, lanes.hanging[lane], lane, rows);
-                        }
-                    }
-                }
+                CellMatrix::Stored => self.add_stored(simd, &self.stored[batches], group, rows),
+                CellMatrix::Half => self.add_stored(simd, &self.half[batches], group, rows),
             }
         }
+    }
+
+    fn add_stored<E: Entry>(
+        &self,
+        simd: Simd,
+        batches: &[StoredBatch<E>],
+        group: &Group,
+        rows: &mut [Block6],
+    ) {
+        if group.weights.is_empty() {
+            // SAFETY: local numbers are indices into `vertices`, which is as long as `rows`.
+            return unsafe { blocks::add_stored(simd, batches, rows) };
+        }
+        for (batch, lanes) in batches.iter().zip(&self.lanes[group.batches.clone()]) {
+            for lane in (0..LANES).filter(|&lane| lanes.cells[lane] != NO_PIECE) {
+                blocks::add_stored_lane(batch, lanes.hanging[lane], lane, rows);
+            }
+        }
+    }
+
+    /// Where the batches of a group are in the list of its kind.
+    #[inline(always)]
+    fn in_list(&self, group: &Group) -> Range<usize> {
+        let before = match group.matrix {
+            CellMatrix::Table(_) => 0,
+            CellMatrix::Stored => self.batches.len(),
+            CellMatrix::Half => self.batches.len() + self.stored.len(),
+        };
+        group.batches.start - before..group.batches.end - before
     }
 
     /// Cell, batch and lane of all lanes in use.
@@ -240,10 +260,14 @@ impl CellChunk {
 
     /// Sets the rotation R of every cell with a stored matrix.
     pub fn set_stored_rotations(&mut self, of: &impl Fn(u32) -> Matrix3<f32>) {
-        for (batch, lanes) in self.stored.iter_mut().zip(&self.lanes[self.batches.len()..]) {
+        let lanes = &self.lanes[self.batches.len()..];
+        let (single, half) = lanes.split_at(self.stored.len());
+        let rotations = self.stored.iter_mut().map(|batch| &mut batch.rotation).zip(single);
+        let rotations = rotations.chain(self.half.iter_mut().map(|batch| &mut batch.rotation).zip(half));
+        for (rotation, lanes) in rotations {
             for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
                 let R = of(cell);
-                (0..9).for_each(|i| batch.rotation[i].0[lane] = R[(i / 3, i % 3)]);
+                (0..9).for_each(|i| rotation[i].0[lane] = R[(i / 3, i % 3)]);
             }
         }
     }
@@ -251,20 +275,14 @@ impl CellChunk {
     /// Sets stored matrices; `of` writes that of the cell with the given number and returns `true`, or leaves the
     /// cell as it is.
     pub fn set_stored(&mut self, of: &impl Fn(u32, &mut [f32; STORED]) -> bool) {
-        let mut entries = [0.0; STORED];
-        let lanes = &self.lanes[self.batches.len()..];
-        for (batch, lanes) in self.stored.iter_mut().zip(lanes) {
-            for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
-                if of(cell, &mut entries) {
-                    batch.entries.iter_mut().zip(entries).for_each(|(to, from)| to.0[lane] = from);
-                }
-            }
-        }
+        let (single, half) = self.lanes[self.batches.len()..].split_at(self.stored.len());
+        set_matrices(&mut self.stored, single, of);
+        set_matrices(&mut self.half, half, of);
     }
 
     /// Bytes in use: all but stored matrices, and these.
     pub fn memory(&self) -> [usize; 2] {
-        let stored = size_of_val(&self.stored[..]);
+        let stored = size_of_val(&self.stored[..]) + size_of_val(&self.half[..]);
         let others = size_of_val(&self.vertices[..])
             + size_of_val(&self.x[..])
             + size_of_val(&self.groups[..])
@@ -278,8 +296,25 @@ impl CellChunk {
     /// Bytes that one application streams.
     pub fn bytes(&self) -> usize {
         self.batches.len() * size_of::<SectorBatch>()
-            + self.stored.len() * size_of::<StoredBatch>()
+            + size_of_val(&self.stored[..])
+            + size_of_val(&self.half[..])
             + self.weights.len() * size_of::<HangingWeights>()
+    }
+}
+
+/// Sets matrices of these batches as in [`CellChunk::set_stored`].
+fn set_matrices<E: Entry>(
+    batches: &mut [StoredBatch<E>],
+    lanes: &[BatchLanes],
+    of: &impl Fn(u32, &mut [f32; STORED]) -> bool,
+) {
+    let mut entries = [0.0; STORED];
+    for (batch, lanes) in batches.iter_mut().zip(lanes) {
+        for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
+            if of(cell, &mut entries) {
+                batch.set(lane, &entries);
+            }
+        }
     }
 }
 

@@ -15,6 +15,8 @@ pub enum CellMatrix {
     /// A stored symmetric matrix of the cell's own, as
     /// [`CellOperator::set_stored`](super::CellOperator::set_stored) gives it; without factor.
     Stored,
+    /// The same rounded to half precision: for preconditioners, whose products wait for memory.
+    Half,
 }
 
 /// A cell to be given a lane. Its matrix A enters the operator as Wᵀ A W with the weights W of hanging corners.

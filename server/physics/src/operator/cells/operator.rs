@@ -72,7 +72,7 @@ impl CellOperator {
         let chunk = |members: &[u32]| {
             let mut members = members.to_vec();
             // As in chunks that are rearranged: cells in one order have the same sums to the bit.
-            if members.iter().any(|&id| lane(id).matrix == CellMatrix::Stored) {
+            if members.iter().any(|&id| !matches!(lane(id).matrix, CellMatrix::Table(_))) {
                 members.sort_unstable();
             }
             CellChunk::new(&members, &lane)

@@ -4,13 +4,17 @@
 
 use std::array::from_ref;
 
+use half::f16;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
 use super::super::Padded;
 use super::batch::{
     Corners, HangingWeights, distribute, from_cell, gather, interpolate, read_matrix, read_weights, scatter,
     to_cell,
 };
 use super::sectors::Matrix24;
-use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8};
+use crate::element::{Halves, Ids, LANES, Lanes, Mat3, Simd, Vector8};
 
 /// Entries of a stored matrix: the upper triangle, row by row. Row 3 j + i is component i of slot j.
 pub const STORED: usize = 300;
@@ -20,25 +24,75 @@ pub const fn stored_entry(r: usize, s: usize) -> usize {
     r * 24 - r * (r + 1) / 2 + s
 }
 
-/// Eight cells with their matrices interleaved: 1.2 kB per cell.
+/// One entry of eight matrices.
+pub trait Entry: Copy + Default + Serialize + DeserializeOwned {
+    /// Largest magnitude that the entries of a matrix are scaled to; `None` leaves them as they are.
+    const LARGEST: Option<f32>;
+
+    /// All eight.
+    fn load<V: Vector8>(&self) -> V;
+    /// That of one lane.
+    fn set(&mut self, lane: usize, value: f32);
+}
+
+impl Entry for Lanes {
+    const LARGEST: Option<f32> = None;
+
+    #[inline(always)]
+    fn load<V: Vector8>(&self) -> V {
+        V::load(self)
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, value: f32) {
+        self.0[lane] = value;
+    }
+}
+
+impl Entry for Halves {
+    const LARGEST: Option<f32> = Some(32768.0);
+
+    #[inline(always)]
+    fn load<V: Vector8>(&self) -> V {
+        V::load_half(self)
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, value: f32) {
+        self.0[lane] = f16::from_f32(value).to_bits();
+    }
+}
+
+/// Eight cells with their matrices interleaved: 1.2 kB per cell, or half of it.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+#[serde(bound = "")]
 #[repr(C)]
-pub struct StoredBatch {
-    /// Upper triangles; 0 in unused lanes.
+pub struct StoredBatch<E: Entry> {
+    /// Upper triangles, divided by their scales; 0 in unused lanes.
     #[serde(with = "crate::storage::saved::array")]
-    pub entries: [Lanes; STORED],
+    pub entries: [E; STORED],
+    /// Scale of the entries of every cell: a power of two, so that it rounds nothing.
+    pub scale: Lanes,
     /// Rotation of every cell.
     pub rotation: Mat3<Lanes>,
     /// Local numbers of the vertices, by slot. Unused lanes have those of the first lane.
     pub nodes: [Ids; 8],
 }
 
-impl StoredBatch {
+impl<E: Entry> StoredBatch<E> {
     /// A batch whose matrices are 0.
     pub fn new(nodes: [Ids; 8]) -> Self {
         let mut rotation = Mat3::<Lanes>::default();
         [0, 4, 8].into_iter().for_each(|i| rotation[i] = Lanes([1.0; LANES]));
-        Self { entries: [Lanes([0.0; LANES]); STORED], rotation, nodes }
+        Self { entries: [E::default(); STORED], scale: Lanes([1.0; LANES]), rotation, nodes }
+    }
+
+    /// Sets the upper triangle of the matrix of a lane.
+    pub fn set(&mut self, lane: usize, entries: &[f32; STORED]) {
+        let scale = E::LARGEST.map_or(1.0, |largest| scale(entries, largest));
+        self.scale.0[lane] = scale;
+        let inverse = 1.0 / scale;
+        self.entries.iter_mut().zip(entries).for_each(|(to, from)| to.set(lane, inverse * from));
     }
 
     /// The matrix A of a lane, without its rotation.
@@ -47,20 +101,33 @@ impl StoredBatch {
         let mut entries = self.entries.iter();
         for r in 0..24 {
             for (s, entry) in (r..24).zip(&mut entries) {
-                (A[r][s], A[s][r]) = (f64::from(entry.0[lane]), f64::from(entry.0[lane]));
+                let entry = f64::from(self.scale.0[lane] * entry.load::<Lanes>().0[lane]);
+                (A[r][s], A[s][r]) = (entry, entry);
             }
         }
         A
     }
 }
 
+/// The power of two by which entries are divided so that the largest comes close to `largest` from below.
+fn scale(entries: &[f32], largest: f32) -> f32 {
+    let most = entries.iter().fold(0.0_f32, |most, entry| most.max(entry.abs()));
+    if !(most > f32::MIN_POSITIVE && most.is_finite()) {
+        return 1.0;
+    }
+    // The exponent of `most`, which is less than twice its power of two; inverses stay in range.
+    let exponent = |x: f32| (x.to_bits() >> 23) as i32 - 127;
+    let wanted = exponent(most) + 1 - exponent(largest);
+    f32::from_bits(((wanted.max(-126) + 127) as u32) << 23)
+}
+
 /// y += Σ Wᵀ R A Rᵀ W x over the batches; see [`multiply`](super::batch::multiply).
 ///
 /// # Safety
 /// All local numbers are below the lengths of `x` and `y`, which are the same.
-pub unsafe fn multiply(
+pub unsafe fn multiply<E: Entry>(
     simd: Simd,
-    batches: &[StoredBatch],
+    batches: &[StoredBatch<E>],
     weights: &[HangingWeights],
     x: &[Padded],
     y: &mut [Padded],
@@ -70,15 +137,15 @@ pub unsafe fn multiply(
         // SAFETY: both come from `Simd::detect` only; the rest is the caller's promise.
         Simd::Avx2 | Simd::Avx512 => unsafe { avx2::multiply(batches, weights, x, y) },
         // SAFETY: the caller's promise.
-        _ => unsafe { multiply_with::<Lanes>(batches, weights, x, y) },
+        _ => unsafe { multiply_with::<Lanes, E>(batches, weights, x, y) },
     }
 }
 
 /// # Safety
 /// As for [`multiply`].
 #[inline(always)]
-unsafe fn multiply_with<V: Vector8>(
-    batches: &[StoredBatch],
+unsafe fn multiply_with<V: Vector8, E: Entry>(
+    batches: &[StoredBatch<E>],
     weights: &[HangingWeights],
     x: &[Padded],
     y: &mut [Padded],
@@ -100,23 +167,32 @@ unsafe fn multiply_with<V: Vector8>(
         }
         let next = batches.get(b + 1);
         let entries = &batch.entries;
+        let ahead = 64 / size_of::<E>();
         // The three rows of a vertex at once: fewer passes over f, and sums that do not wait for each other.
         for r in [0, 3, 6, 9, 12, 15, 18, 21] {
             let rows = [stored_entry(r, r), stored_entry(r + 1, r + 1) - 1, stored_entry(r + 2, r + 2) - 2];
             if let Some(next) = next {
-                let lines = next.entries[rows[0]..rows[2] + 24 - r].chunks(2);
+                let lines = next.entries[rows[0]..rows[2] + 24 - r].chunks(ahead);
                 lines.for_each(|line| V::prefetch(&line[0]));
             }
-            let entry = |i: usize, s: usize| &entries[rows[i] + s - r];
+            let at = |i: usize, s: usize| rows[i] + s - r;
             let (x, y, z) = (v[r], v[r + 1], v[r + 2]);
-            let (xy, xz, yz) = (V::load(entry(0, r + 1)), V::load(entry(0, r + 2)), V::load(entry(1, r + 2)));
+            let (xy, xz, yz) = (
+                entries[at(0, r + 1)].load::<V>(),
+                entries[at(0, r + 2)].load::<V>(),
+                entries[at(1, r + 2)].load::<V>(),
+            );
             let mut sums = [
-                V::load(entry(0, r)).mul_add(x, xy.mul_add(y, xz.mul_add(z, f[r]))),
-                xy.mul_add(x, V::load(entry(1, r + 1)).mul_add(y, yz.mul_add(z, f[r + 1]))),
-                xz.mul_add(x, yz.mul_add(y, V::load(entry(2, r + 2)).mul_add(z, f[r + 2]))),
+                entries[at(0, r)].load::<V>().mul_add(x, xy.mul_add(y, xz.mul_add(z, f[r]))),
+                xy.mul_add(x, entries[at(1, r + 1)].load::<V>().mul_add(y, yz.mul_add(z, f[r + 1]))),
+                xz.mul_add(x, yz.mul_add(y, entries[at(2, r + 2)].load::<V>().mul_add(z, f[r + 2]))),
             ];
             for s in r + 3..24 {
-                let (a, b, c) = (V::load(entry(0, s)), V::load(entry(1, s)), V::load(entry(2, s)));
+                let (a, b, c) = (
+                    entries[at(0, s)].load::<V>(),
+                    entries[at(1, s)].load::<V>(),
+                    entries[at(2, s)].load::<V>(),
+                );
                 sums[0] = a.mul_add(v[s], sums[0]);
                 sums[1] = b.mul_add(v[s], sums[1]);
                 sums[2] = c.mul_add(v[s], sums[2]);
@@ -132,6 +208,12 @@ unsafe fn multiply_with<V: Vector8>(
         if let Some(weights) = weights {
             distribute(&mut u, &read_weights(weights));
         }
+        let scale = V::load(&batch.scale);
+        for i in 0..3 {
+            for j in 0..8 {
+                u[i][j] = scale * u[i][j];
+            }
+        }
         from_cell(&mut u, &R);
         // SAFETY: the caller's promise.
         unsafe { scatter(y, &batch.nodes, &u) };
@@ -142,19 +224,59 @@ unsafe fn multiply_with<V: Vector8>(
 mod avx2 {
     //! The same loop compiled for AVX2 and FMA.
 
-    use super::{HangingWeights, Padded, StoredBatch};
+    use super::{Entry, HangingWeights, Padded, StoredBatch};
     use crate::element::avx2::Register;
 
     /// # Safety
     /// As for [`super::multiply`].
-    #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn multiply(
-        batches: &[StoredBatch],
+    #[target_feature(enable = "avx2,fma,f16c")]
+    pub unsafe fn multiply<E: Entry>(
+        batches: &[StoredBatch<E>],
         weights: &[HangingWeights],
         x: &[Padded],
         y: &mut [Padded],
     ) {
         // SAFETY: the caller's promise.
-        unsafe { super::multiply_with::<Register>(batches, weights, x, y) };
+        unsafe { super::multiply_with::<Register, E>(batches, weights, x, y) };
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// Whatever their unit, entries keep eleven bits, or their error is below 2⁻³⁹ of the largest entry.
+    #[test]
+    fn half_precision_keeps_eleven_bits_in_any_unit() {
+        let entries: [f32; STORED] = std::array::from_fn(|i| {
+            let x = ((i * 7919 + 13) % 1009) as f32 / 504.5 - 1.0;
+            x * [1.0, 1e-3, 1e-6, 1e-10][i % 4]
+        });
+        let largest = f64::from(entries.iter().fold(0.0_f32, |largest, entry| largest.max(entry.abs())));
+        for unit in [1e-35_f32, 1e-20, 1e-3, 1.0, 1e12, 1e37] {
+            let scaled = entries.map(|entry| unit * entry);
+            let mut batch = StoredBatch::<Halves>::new([[0; LANES]; 8]);
+            batch.set(3, &scaled);
+            let (found, none) = (batch.matrix(3), batch.matrix(2));
+            for r in 0..24 {
+                for s in r..24 {
+                    let expected = f64::from(scaled[stored_entry(r, s)]);
+                    let error = (found[r][s] - expected).abs();
+                    let allowed = (expected.abs() / 2048.0).max(f64::from(unit) * largest / 2.0_f64.powi(39));
+                    assert!(error <= allowed, "{unit:e}: {expected:e} {:e}", found[r][s]);
+                    assert_eq!((found[s][r], none[r][s]), (found[r][s], 0.0));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn matrices_without_a_scale_stay_what_they_are() {
+        assert_eq!(scale(&[0.0; STORED], 32768.0), 1.0);
+        assert_eq!(scale(&[1.0, f32::INFINITY], 32768.0), 1.0);
+        let mut batch = StoredBatch::<Halves>::new([[0; LANES]; 8]);
+        batch.set(0, &[f32::NAN; STORED]);
+        assert!(batch.matrix(0)[5][7].is_nan());
     }
 }

@@ -32,13 +32,21 @@ pub struct MultigridSettings {
     /// Rotations within a merged cell that differ from their mean by no more than this [rad] count as equal. 0
     /// gives exact Galerkin operators.
     pub same_rotation_rad: f64,
+    /// Whether matrices of coarse cells are rounded to half precision where smoothing multiplies with them: cycles
+    /// wait for memory less. Coarser matrices are made of those in single precision.
+    pub half_precision: bool,
     /// Instructions of the kernels.
     pub simd: Simd,
 }
 
 impl Default for MultigridSettings {
     fn default() -> Self {
-        Self { smoother: Smoother::default(), same_rotation_rad: 0.1, simd: Simd::detect() }
+        Self {
+            smoother: Smoother::default(),
+            same_rotation_rad: 0.1,
+            half_precision: true,
+            simd: Simd::detect(),
+        }
     }
 }
 
@@ -136,7 +144,9 @@ impl Multigrid {
             let n = level.n_vertices;
             let if_needed = |needed: bool| if needed { vec![[0.0; 4]; n] } else { Vec::new() };
             let (zeros, inner) = (|| if_needed(l >= first), || if_needed(l > 0 && l != first));
-            let kernel = (l > 0 && l >= first).then(|| LevelKernel::new(settings.simd));
+            // On the level that is solved on a kernel is the operator of the equations.
+            let half = settings.half_precision && l > first;
+            let kernel = (l > 0 && l >= first).then(|| LevelKernel::new(settings.simd, half));
             Vectors {
                 inverse: if l > first { vec![Inverse3::default(); n] } else { Vec::new() },
                 largest: if l < first { 0.0 } else { 1.0 },

@@ -37,6 +37,8 @@ const UPPER: [u16; STORED] = {
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct LevelKernel {
     simd: Simd,
+    /// What a matrix of a cell's own is held as.
+    stored: LaneMatrix,
     operator: CellOperator,
     /// Matrices that the cells were arranged with.
     arranged: Vec<LaneMatrix>,
@@ -51,10 +53,12 @@ pub struct LevelKernel {
 }
 
 impl LevelKernel {
-    /// No cells yet: which of them have a matrix of their own is known at the first update.
-    pub fn new(simd: Simd) -> Self {
+    /// No cells yet: which of them have a matrix of their own is known at the first update. If these are to be `half`,
+    /// they are rounded to half precision; products take half the time then.
+    pub fn new(simd: Simd, half: bool) -> Self {
         Self {
             simd,
+            stored: if half { LaneMatrix::Half } else { LaneMatrix::Stored },
             operator: CellOperator::new(simd, &[], &[], &[], 0),
             arranged: Vec::new(),
             moved: Vec::new(),
@@ -67,7 +71,8 @@ impl LevelKernel {
     /// Arranges the cells of `level`.
     fn arrange(&mut self, level: &Level, matrices: &LevelMatrices) {
         let n = level.cells.len();
-        let lanes: Vec<CellLane> = (0..n).map(|id| lane(level, id, matrices.matrix[id])).collect();
+        let lanes: Vec<CellLane> =
+            (0..n).map(|id| lane(level, id, lane_matrix(matrices.matrix[id], self.stored))).collect();
         self.operator =
             CellOperator::new(self.simd, &[], &lanes, &morton_order(&level.cells), level.n_vertices);
         self.arranged = lanes.iter().map(|lane| lane.matrix).collect();
@@ -92,7 +97,8 @@ impl LevelKernel {
             self.operator.set_tables(&galerkin.shared.iter().map(table).collect::<Vec<_>>());
         }
         let matrices = &galerkin.levels[l];
-        let Self { operator, arranged, moved, origin, cut, fresh, .. } = self;
+        let Self { operator, arranged, moved, origin, cut, fresh, stored, .. } = self;
+        let lane_matrix = |matrix| lane_matrix(matrix, *stored);
         let (known, n) = (arranged.len(), level.cells.len());
         moved.resize(n, true);
         let mut any = !cut.is_empty();
@@ -103,10 +109,10 @@ impl LevelKernel {
                 (*arranged, any) = (now, true);
             }
         }
-        arranged.extend(matrices.matrix[known..].iter().map(|matrix| lane_matrix(*matrix)));
+        arranged.extend(matrices.matrix[known..].iter().map(|&matrix| lane_matrix(matrix)));
         // All cells of a chunk that is arranged anew lose their matrices.
         if any {
-            let lane = |id: u32| lane(level, id as usize, matrices.matrix[id as usize]);
+            let lane = |id: u32| lane(level, id as usize, lane_matrix(matrices.matrix[id as usize]));
             let renewed = if !cut.is_empty() {
                 moved[known..].fill(true);
                 cut.drain(..).for_each(|id| moved[id as usize] = true);
@@ -258,9 +264,8 @@ pub fn noise(v: u32) -> Padded {
     [0, 1, 2, 3].map(|k| if k < 3 { number(k) as f32 / (1 << 23) as f32 - 1.0 } else { 0.0 })
 }
 
-fn lane(level: &Level, id: usize, matrix: CellMatrix) -> CellLane {
-    let (octant, vertices, matrix) =
-        (level.cells[id].octant() as u8, level.vertices[id], lane_matrix(matrix));
+fn lane(level: &Level, id: usize, matrix: LaneMatrix) -> CellLane {
+    let (octant, vertices) = (level.cells[id].octant() as u8, level.vertices[id]);
     match matrix {
         LaneMatrix::Table(_) => CellLane {
             vertices: slot_corners(vertices, octant),
@@ -270,13 +275,13 @@ fn lane(level: &Level, id: usize, matrix: CellMatrix) -> CellLane {
             factor: 1.0,
         },
         // A stored matrix is over the vertices themselves.
-        LaneMatrix::Stored => CellLane { vertices, octant: 0, hanging: 0, matrix, factor: 1.0 },
+        _ => CellLane { vertices, octant: 0, hanging: 0, matrix, factor: 1.0 },
     }
 }
 
-fn lane_matrix(matrix: CellMatrix) -> LaneMatrix {
+fn lane_matrix(matrix: CellMatrix, stored: LaneMatrix) -> LaneMatrix {
     match matrix {
         CellMatrix::Shared(kind) => LaneMatrix::Table(kind as u16),
-        CellMatrix::Stored(_) => LaneMatrix::Stored,
+        CellMatrix::Stored(_) => stored,
     }
 }

@@ -241,7 +241,9 @@ fn operators_that_follow_cuts_are_those_made_anew() {
             let mut octree = cube(cells, levels);
             // With a tolerance matrices would depend on earlier rotations, so these stay the same then.
             let (same_rotation_rad, turn) = if threads == 1 { (0.1, 0.0) } else { (0.0, 0.1) };
-            let settings = MultigridSettings { same_rotation_rad, ..MultigridSettings::default() };
+            let half_precision = false;
+            let settings =
+                MultigridSettings { same_rotation_rad, half_precision, ..MultigridSettings::default() };
             let made_anew = |octree: &Octree| {
                 let mut hierarchy = Hierarchy::with(octree, 300, true);
                 if threads == 2 {

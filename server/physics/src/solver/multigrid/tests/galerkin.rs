@@ -61,7 +61,7 @@ fn error(hierarchy: &Hierarchy, galerkin: &Galerkin, exact: &Exact) -> f64 {
         if l > 0 {
             galerkin.operator(level, l).apply(&mut team, &x32, &mut y32, &mut products);
             // The kernels do the same.
-            let mut kernel = LevelKernel::new(Simd::detect());
+            let mut kernel = LevelKernel::new(Simd::detect(), false);
             kernel.follow(&mut team, level, (galerkin, l, true));
             let mut by_kernel = vec![[0.0; 4]; x.len()];
             kernel.apply(&mut team, &galerkin.levels[l].mass, &x32, &mut by_kernel);
