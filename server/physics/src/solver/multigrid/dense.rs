@@ -28,6 +28,9 @@ const HELD_STIFFNESS: f32 = 1e-3;
 /// Entries between the vertices, a column per lane register.
 type Plane = [Lanes; 8];
 
+/// A row by components: the entries of all vertices in a register each.
+pub type ByComponent = [Lanes; 3];
+
 /// Where each plane begins in a packed matrix.
 const BEGIN: [usize; 6] = [0, 36, 100, 164, 200, 264];
 
@@ -199,6 +202,26 @@ impl Dense {
     pub fn add<V: Vector8>(&mut self, other: &Self) {
         for (column, other) in self.0.as_flattened_mut().iter_mut().zip(other.0.as_flattened()) {
             *column = (V::load(column) + V::load(other)).store();
+        }
+    }
+
+    /// Subtracts Xᵀ X, of which these are the rows.
+    #[inline(always)]
+    pub fn subtract_square<V: Vector8>(&mut self, X: &[ByComponent]) {
+        for (plane, [i, j]) in self.0.iter_mut().zip(COMPONENTS) {
+            let mut columns = [V::splat(0.0); 8];
+            for_eight!(b => {
+                columns[b] = V::load(&plane[b]);
+            });
+            for row in X {
+                let x = V::load(&row[i]);
+                for_eight!(b => {
+                    columns[b] = V::splat(-row[j].0[b]).mul_add(x, columns[b]);
+                });
+            }
+            for_eight!(b => {
+                plane[b] = columns[b].store();
+            });
         }
     }
 

@@ -115,7 +115,7 @@ impl Context<'_> {
                 }
             }
             if let Some(thin) = &mut thin {
-                thin.add(fine, child, &A);
+                thin.add::<V>(fine, child, &A);
             }
             if merges {
                 sum.add::<V>(&A.carried::<V>(&corners_in(fine, child, cell)));
@@ -127,7 +127,7 @@ impl Context<'_> {
             sum = sum.carried::<V>(&weights(cell, coarse.hanging[id]));
         }
         if let Some(thin) = thin {
-            thin.relax(&mut sum, &mut stored.inner);
+            thin.relax::<V>(&mut sum, &mut stored.inner);
         }
         stored.matrix = sum.packed();
     }

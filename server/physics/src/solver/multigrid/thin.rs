@@ -27,9 +27,10 @@
 
 use nalgebra::Matrix3;
 
-use super::dense::Dense;
+use super::dense::{ByComponent, Dense};
 use super::level::{Level, NONE, place_in, trilinear};
 use super::step::Step;
+use crate::element::{LANES, Lanes, Vector8};
 use crate::operator::Padded;
 
 /// Vertices of the 2³ children of a cell.
@@ -37,10 +38,11 @@ const VERTICES: usize = 27;
 /// Those of them in the middle between others.
 pub(super) const INNER: usize = VERTICES - 8;
 const UNKNOWNS: usize = 3 * INNER;
-/// Entries of a row: a whole number of vectors.
-const ROW: usize = UNKNOWNS.next_multiple_of(4);
-/// Pivots below this part of their diagonal entry are none: nothing holds the inner vertices then.
-const PIVOT: f64 = 1e-6;
+/// Registers of a row.
+const ROW: usize = UNKNOWNS.div_ceil(LANES);
+/// Pivots below this part of their diagonal entry are none: nothing holds the inner vertices then, and what is left is
+/// rounding.
+const PIVOT: f32 = 1e-4;
 
 /// Inner vertices of a thin cell, and D.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
@@ -94,14 +96,14 @@ fn bit(place: [i32; 3]) -> u32 {
 /// Room for the equations of the inner vertices of one cell after the other.
 pub struct Equations {
     /// A_ii, of which the upper triangle is used.
-    A: [[f64; ROW]; UNKNOWNS],
-    /// (A W)_i.
-    AW: [[f64; 24]; UNKNOWNS],
+    A: [[Lanes; ROW]; UNKNOWNS],
+    /// (A W)_i: a register of the cell's corners for every component.
+    AW: [ByComponent; UNKNOWNS],
 }
 
 impl Default for Equations {
     fn default() -> Self {
-        Self { A: [[0.0; ROW]; UNKNOWNS], AW: [[0.0; 24]; UNKNOWNS] }
+        Self { A: [[Lanes::default(); ROW]; UNKNOWNS], AW: [Default::default(); UNKNOWNS] }
     }
 }
 
@@ -109,7 +111,7 @@ impl Default for Equations {
 pub struct Thin<'a> {
     vertices: [u32; VERTICES],
     /// Trilinear weights of the cell's corners.
-    weights: [[f32; 8]; VERTICES],
+    weights: [Lanes; VERTICES],
     /// Number among the inner ones, or [`INNER`].
     inner: [usize; VERTICES],
     n: usize,
@@ -135,7 +137,7 @@ impl<'a> Thin<'a> {
         let children = step.children_of(id);
         let mut thin = Self {
             vertices: [NONE; VERTICES],
-            weights: [[0.0; 8]; VERTICES],
+            weights: [Lanes::default(); VERTICES],
             inner: [INNER; VERTICES],
             n: 0,
             known: 0,
@@ -159,7 +161,8 @@ impl<'a> Thin<'a> {
                     if known == VERTICES {
                         return None;
                     }
-                    (thin.vertices[known], thin.weights[known], places[known]) = (v, trilinear(place), place);
+                    thin.weights[known] = Lanes(trilinear(place));
+                    (thin.vertices[known], places[known]) = (v, place);
                     known += 1;
                 }
             }
@@ -183,33 +186,35 @@ impl<'a> Thin<'a> {
             }
         }
         let n = 3 * thin.n;
-        thin.equations.A[..n].iter_mut().for_each(|row| row[..n].fill(0.0));
-        thin.equations.AW[..n].fill([0.0; 24]);
+        thin.equations.A[..n].fill([Lanes::default(); ROW]);
+        thin.equations.AW[..n].fill(Default::default());
         (n > 0).then_some(thin)
     }
 
     /// Adds the matrix of a child, in the frame of the cell.
     #[inline(always)]
-    pub fn add(&mut self, fine: &Level, child: usize, A: &Dense) {
+    pub fn add<V: Vector8>(&mut self, fine: &Level, child: usize, A: &Dense) {
         let places = fine.vertices[child].map(|v| self.vertices.iter().position(|w| *w == v).unwrap_or(0));
         for (c, &place) in places.iter().enumerate() {
             (0..3).for_each(|k| self.diagonal[place][k] += A.entry(3 * c + k, 3 * c + k));
         }
         for (c, &row) in places.iter().enumerate().filter(|(_, row)| self.inner[**row] < INNER) {
             for r in 0..3 {
-                let entries = A.row(3 * c + r).map(f64::from);
+                let entries = A.row(3 * c + r);
                 let at = 3 * self.inner[row] + r;
-                let (of_inner, of_corners) = (&mut self.equations.A[at], &mut self.equations.AW[at]);
+                let mut of_corners = load::<V, 3>(&self.equations.AW[at], 0);
                 for (entries, &column) in entries.chunks_exact(3).zip(&places) {
+                    let weights = V::load(&self.weights[column]);
+                    for k in 0..3 {
+                        of_corners[k] = V::splat(entries[k]).mul_add(weights, of_corners[k]);
+                    }
                     if self.inner[column] < INNER {
                         let first = 3 * self.inner[column];
-                        of_inner[first..first + 3].iter_mut().zip(entries).for_each(|(a, entry)| *a += entry);
-                    }
-                    let weights = self.weights[column].iter().zip(of_corners.chunks_exact_mut(3));
-                    for (&w, aw) in weights.filter(|(w, _)| **w != 0.0) {
-                        aw.iter_mut().zip(entries).for_each(|(a, entry)| *a += f64::from(w) * entry);
+                        let of_inner = &mut self.equations.A[at];
+                        (0..3).for_each(|k| *entry_mut(of_inner, first + k) += entries[k]);
                     }
                 }
+                store(of_corners, &mut self.equations.AW[at], 0);
             }
         }
     }
@@ -218,61 +223,112 @@ impl<'a> Thin<'a> {
     /// vertices if A_ii is not positive definite, or if another vertex has no stiffness because it rests on held ones:
     /// what moves that alone would then have none either.
     #[inline(always)]
-    pub fn relax(self, sum: &mut Dense, inner: &mut Inner) {
+    pub fn relax<V: Vector8>(self, sum: &mut Dense, inner: &mut Inner) {
         if self.diagonal[..self.known].iter().flatten().any(|d| *d <= 0.0) {
             return;
         }
         let n = 3 * self.n;
         let Equations { A: U, AW: X } = self.equations;
         // A_ii = Uᵀ U, row by row, in place.
-        let mut least = [0.0; UNKNOWNS];
-        (0..n).for_each(|j| least[j] = PIVOT * U[j][j]);
-        for j in 0..n {
-            if U[j][j] <= least[j] || U[j][j].is_nan() {
+        let mut reciprocal = [0.0; UNKNOWNS];
+        for i in 0..n {
+            let least = PIVOT * entry(&U[i], i);
+            let first = i / LANES;
+            match n.div_ceil(LANES) - first {
+                1 => eliminate::<V, 1>(U, i, first),
+                2 => eliminate::<V, 2>(U, i, first),
+                3 => eliminate::<V, 3>(U, i, first),
+                4 => eliminate::<V, 4>(U, i, first),
+                5 => eliminate::<V, 5>(U, i, first),
+                6 => eliminate::<V, 6>(U, i, first),
+                7 => eliminate::<V, 7>(U, i, first),
+                _ => eliminate::<V, 8>(U, i, first),
+            }
+            let pivot = entry(&U[i], i);
+            if pivot <= least || pivot.is_nan() {
                 return;
             }
-            let root = U[j][j].sqrt();
-            U[j][j..n].iter_mut().for_each(|u| *u /= root);
-            let pivot = U[j];
-            for i in j + 1..n {
-                subtract(&mut U[i][i..n], pivot[i], &pivot[i..n]);
+            reciprocal[i] = 1.0 / pivot.sqrt();
+            let scale = V::splat(reciprocal[i]);
+            for register in &mut U[i][first..] {
+                *register = (scale * V::load(register)).store();
             }
         }
         // X = U⁻ᵀ (A W)_i, so that (A W)_iᵀ A_ii⁻¹ (A W)_i = Xᵀ X.
-        for j in 0..n {
-            let u = U[j][j];
-            X[j].iter_mut().for_each(|x| *x /= u);
-            let known = X[j];
-            for i in j + 1..n {
-                subtract(&mut X[i], U[j][i], &known);
+        for i in 0..n {
+            let mut row = load::<V, 3>(&X[i], 0);
+            for j in 0..i {
+                subtract(&mut row, entry(&U[j], i), &X[j], 0);
             }
+            scale_and_store::<V>(row, reciprocal[i], &mut X[i]);
         }
-        let mut product = [[0.0; 24]; 24];
-        for x in &X[..n] {
-            product.iter_mut().zip(x).for_each(|(row, &f)| subtract(row, -f, x));
-        }
-        for p in 0..24 {
-            for q in p..24 {
-                sum.set(p, q, (f64::from(sum.entry(p, q)) - product[p][q]) as f32);
-            }
-        }
+        sum.subtract_square::<V>(&X[..n]);
         // D = −U⁻¹ X.
         for i in (0..n).rev() {
+            let mut row = load::<V, 3>(&X[i], 0);
             for k in i + 1..n {
-                let known = X[k];
-                subtract(&mut X[i], U[i][k], &known);
+                subtract(&mut row, entry(&U[i], k), &X[k], 0);
             }
-            let u = U[i][i];
-            X[i].iter_mut().for_each(|x| *x /= u);
+            scale_and_store::<V>(row, reciprocal[i], &mut X[i]);
         }
-        inner.change.extend(X[..n].iter().map(|row| row.map(|x| -x as f32)));
+        inner.change.extend(X[..n].iter().map(|row| std::array::from_fn(|s| -row[s % 3].0[s / 3])));
         let numbers = self.vertices.iter().zip(self.inner).filter(|(_, number)| *number < INNER);
         inner.vertices.extend(numbers.map(|(v, _)| *v));
     }
 }
 
-/// a −= f b.
+/// Subtracts from row `i` of A_ii, from register `first` on, what the rows above make of it. What is before the diagonal
+/// is of no meaning.
 #[inline(always)]
-fn subtract(a: &mut [f64], f: f64, b: &[f64]) {
-    a.iter_mut().zip(b).for_each(|(a, b)| *a -= f * b);
+fn eliminate<V: Vector8, const N: usize>(U: &mut [[Lanes; ROW]; UNKNOWNS], i: usize, first: usize) {
+    let mut row = load::<V, N>(&U[i], first);
+    for above in &U[..i] {
+        subtract(&mut row, entry(above, i), above, first);
+    }
+    store(row, &mut U[i], first);
+}
+
+/// Entry `at` of a row.
+#[inline(always)]
+fn entry(row: &[Lanes], at: usize) -> f32 {
+    row[at / LANES].0[at % LANES]
+}
+
+#[inline(always)]
+fn entry_mut(row: &mut [Lanes], at: usize) -> &mut f32 {
+    &mut row[at / LANES].0[at % LANES]
+}
+
+/// N registers of a row from register `first` on.
+#[inline(always)]
+fn load<V: Vector8, const N: usize>(row: &[Lanes], first: usize) -> [V; N] {
+    let mut out = [V::splat(0.0); N];
+    for k in 0..N {
+        out[k] = V::load(&row[first + k]);
+    }
+    out
+}
+
+#[inline(always)]
+fn store<V: Vector8, const N: usize>(from: [V; N], row: &mut [Lanes], first: usize) {
+    for k in 0..N {
+        row[first + k] = from[k].store();
+    }
+}
+
+/// row −= f · other, of which register `first` is the first that counts.
+#[inline(always)]
+fn subtract<V: Vector8, const N: usize>(row: &mut [V; N], f: f32, other: &[Lanes], first: usize) {
+    let f = V::splat(-f);
+    for k in 0..N {
+        row[k] = f.mul_add(V::load(&other[first + k]), row[k]);
+    }
+}
+
+#[inline(always)]
+fn scale_and_store<V: Vector8>(mut row: [V; 3], factor: f32, to: &mut ByComponent) {
+    for register in &mut row {
+        *register = V::splat(factor) * *register;
+    }
+    store(row, to, 0);
 }
