@@ -155,3 +155,62 @@ fn pair(first: Register, second: Register) -> Register512 {
         _mm512_castpd_ps(_mm512_insertf64x4::<1>(wide, _mm256_castps_pd(second.0)))
     })
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use nalgebra::{Matrix3, Rotation3, Vector3};
+
+    use super::*;
+    use crate::element::{LANES, Mat3, Simd, polar_newton};
+
+    type Turned = (Mat3<Lanes>, u16);
+
+    #[target_feature(enable = "avx2,fma")]
+    fn alone(F: &Mat3<Lanes>) -> Turned {
+        let (mut X, mut out) = ([Register::splat(0.0); 9], [Lanes::default(); 9]);
+        X.iter_mut().zip(F).for_each(|(x, f)| *x = Register::load(f));
+        let (R, trusted) = polar_newton(&X);
+        out.iter_mut().zip(R).for_each(|(out, r)| *out = r.store());
+        (out, trusted)
+    }
+
+    #[target_feature(enable = "avx512f,avx2,fma")]
+    fn together(F: &[Mat3<Lanes>; 2]) -> [Turned; 2] {
+        let mut X = [Register512::splat(0.0); 9];
+        X.iter_mut().enumerate().for_each(|(i, x)| *x = Register512::read(F, |F| &F[i]));
+        let (R, trusted) = polar_newton(&X);
+        [0, 1].map(|batch| (R.map(|r| r.part(batch).store()), trusted >> (8 * batch) & 0xFF))
+    }
+
+    /// Whatever the stretches of its neighbour, a batch has the rotations that it has alone, to the last bit.
+    #[test]
+    fn a_batch_turns_as_if_it_were_alone() {
+        if Simd::detect() != Simd::Avx512 {
+            return;
+        }
+        let batch = |stretch: f64, seed: usize| {
+            let mut F = [Lanes::default(); 9];
+            for lane in 0..LANES {
+                let t = (seed * LANES + lane) as f64;
+                let turn = Rotation3::new(Vector3::new(t.sin(), (2.3 * t).cos(), (0.7 * t).sin()) * 2.0);
+                let stretched = Vector3::new(1.0 + stretch * t.cos(), 1.0 - 0.5 * stretch * t.sin(), 1.0);
+                let gradient = turn.matrix() * Matrix3::from_diagonal(&stretched);
+                (0..9).for_each(|i| F[i].0[lane] = gradient[(i / 3, i % 3)] as f32);
+            }
+            F
+        };
+        // Three, four and five iterations, and lanes that are not to be trusted.
+        let stretches = [0.0, 0.02, 0.3, 0.8, 1.2];
+        for (i, &first) in stretches.iter().enumerate() {
+            for (j, &second) in stretches.iter().enumerate() {
+                let pair = [batch(first, 2 * i + 1), batch(second, 2 * j)];
+                // SAFETY: the instructions were detected.
+                let (both, each) = unsafe { (together(&pair), pair.map(|F| alone(&F))) };
+                let bits =
+                    |of: [Turned; 2]| of.map(|(R, trusted)| (R.map(|r| r.0.map(f32::to_bits)), trusted));
+                assert_eq!(bits(both), bits(each), "{first} beside {second}");
+            }
+        }
+    }
+}
