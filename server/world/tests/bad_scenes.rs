@@ -142,10 +142,6 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
         &["load.0.pressure_pa", "a pressure with cutting.method = `snap`", "give a force_n"],
     );
     assert_says(&with(&pressed(", share = \"area\"")), &["load.0.share", "beside pressure_pa", "remove it"]);
-    assert_says(
-        &with(&format!("element = \"octree\"\n{}", pressed(""))),
-        &["load.0.pressure_pa", "octree cells", "tet4, tet10, hex8"],
-    );
     assert_says(&with(&pressed(", force_n = [1, 0, 0]")), &["load.0", "force_n", "pressure_pa"]);
     assert_says(&with(&format!("load = [{{ {slab} }}]")), &["load.0", "force_n", "pressure_pa"]);
     assert_says(&with(&pressed("0000000000")), &["load.0.pressure_pa", "at most 1000000000"]);

@@ -237,3 +237,32 @@ fn an_equilibrium_of_corotational_cells_takes_the_fast_path() {
     assert!(sim.bodies()[0].displacement_m() > 1e-3);
     assert_eq!(sim.failures(), Vec::<String>::new());
 }
+
+/// A pressure follows the surface, so an equilibrium under it is searched on the general path. In motion it is taken where
+/// cells move to, on the fast path, and the end is the same.
+#[test]
+fn an_equilibrium_of_cells_under_pressure_takes_the_general_path() {
+    let pressed = BLOCK
+        .replace("force_n = [0, 0, -0.01]", "pressure_pa = -1500")
+        .replace("gravity_m_s2 = [0, 0, -9.81]", "gravity_m_s2 = [0, 0, 0]")
+        .replace("young_pa = 2e5", "integrator = \"static\"\n    young_pa = 5e4")
+        .replace("octree = { levels = 2 }", "octree = { levels = 2 }\n    solver = { tolerance = 1e-6 }");
+    let mut sim = start(&pressed).unwrap();
+    let plan = sim.plan();
+    let why = &plan.effects.iter().find(|effect| effect.name == "deformation block").unwrap().why;
+    assert!(why.contains("general path for a pressure in equilibrium"), "{why}");
+    let solve = sim.step(&Inputs::default()).bodies[0].solve;
+    assert!(!solve.is_unconverged(), "{solve:?}");
+    let damped = "integrator = \"implicit-euler\"\n    rayleigh = { mass_1_s = 20 }";
+    let mut moving = start(&pressed.replace("integrator = \"static\"", damped)).unwrap();
+    assert!(moving.bodies()[0].body.is_fast());
+    for _ in 0..400 {
+        moving.step(&Inputs::default());
+    }
+    let ends = [&sim, &moving].map(|sim| &sim.bodies()[0].body);
+    // Pulled out by about p L/E, and more around the cut.
+    let moved = sim.bodies()[0].displacement_m();
+    let apart = ends[0].positions().iter().zip(ends[1].positions()).map(|(a, b)| (a - b).norm());
+    let apart = apart.fold(0.0, f64::max);
+    assert!((2e-3..2e-2).contains(&moved) && apart < 0.01 * moved, "{apart} {moved}");
+}

@@ -13,7 +13,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Body, BodyError};
+use super::{Body, BodyError, Scheme};
 use crate::material::Law;
 
 /// A pressure as requested; cuts do not change it.
@@ -32,11 +32,12 @@ impl Body {
     /// the linear law those of the rest configuration. A share of it acts that
     /// [`set_pressure_shares`](Self::set_pressure_shares) sets; it is 1 at first.
     ///
-    /// After cuts, what is left of the skin stays loaded. The lips of cuts carry no pressure.
+    /// After cuts, what is left of the skin stays loaded. The lips of cuts carry no pressure. The skin of octree cells
+    /// are their faces at the boundary, steps where it is inclined.
     ///
     /// # Errors
-    /// A pressure of 10¹² Pa or more, nodes that do not exist, a selection without faces, elements without faces for it
-    /// (octree cells), cuts that change the mesh, and relaxation with a law that is not linear.
+    /// A pressure of 10¹² Pa or more, nodes that do not exist, a selection without faces, cuts that change the mesh, and,
+    /// with a law that is not linear, relaxation and equilibria on the fast path.
     ///
     /// # Source
     /// Bonet, Wood 2008, "Nonlinear Continuum Mechanics for Finite Element Analysis", §8.5.
@@ -67,10 +68,12 @@ impl Body {
         if self.settings.relaxation && follows {
             return refused("relaxation of a law that is not linear", "another solver");
         }
-        let mut faces = 0;
-        if !self.space.for_skin_faces(&selected, &mut |_| faces += 1) {
-            return refused(self.space.name(), "tet4, tet10 or hex8");
+        // Nothing moves between their solves, so the force would be that of the last step.
+        if self.settings.scheme == Scheme::Static && follows && self.is_fast() {
+            return refused("equilibria on the fast path", "settings with `pressed`, or mixed precision");
         }
+        let mut faces = 0;
+        self.space.for_skin_faces(&selected, &mut |_| faces += 1);
         if faces == 0 {
             return Err(BodyError::NoSkinFace { pressure_pa });
         }

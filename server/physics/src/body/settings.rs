@@ -42,6 +42,9 @@ pub struct BodySettings {
     pub fibres: Fibres,
     /// Terms of a Prony series beside the law: viscoelasticity.
     pub prony: Prony,
+    /// Whether the surface will be under [pressure](super::Body::add_pressure). Equilibria of a law that rotates then take
+    /// the general path, where the pressure follows the surface.
+    pub pressed: bool,
     /// Integration of the volumetric energy: a remedy against locking, or none.
     pub volumetric: Volumetric,
     /// Time integration scheme; [`Scheme::Static`] for equilibria.
@@ -112,6 +115,7 @@ impl Default for BodySettings {
             cubes: false,
             fibres: Fibres::default(),
             prony: Prony::default(),
+            pressed: false,
             volumetric: Volumetric::Full,
             scheme: Scheme::ImplicitEuler,
             mass: MassKind::Lumped,
@@ -147,6 +151,7 @@ impl BodySettings {
             (!self.fibres.is_empty(), "fibres"),
             (!self.prony.is_empty(), "viscoelasticity"),
             (self.scheme.is_explicit(), "an explicit integrator"),
+            (self.pressed && Self { pressed: false, ..*self }.descends(law), "a pressure in equilibrium"),
             (
                 self.scheme == Scheme::Static && law.rotates() && !self.descends(law),
                 "the static integrator with a law that rotates",
@@ -179,6 +184,7 @@ impl BodySettings {
             && self.prony.is_empty()
             && self.simulate_level == 0
             && !self.relaxation
+            && !self.pressed
     }
 
     /// The arithmetic of a body of this law: the requested one; else single precision if the fast path

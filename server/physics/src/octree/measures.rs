@@ -94,10 +94,9 @@ impl Octree {
         for (id, cell) in self.cells.iter().enumerate().filter(|(_, cell)| cell.cut != 0) {
             let W = corner_weights(cell, self.hanging[id]);
             for (d, face) in FACES.iter().enumerate() {
-                let outside = cell.cut >> d & 1 == 1 && self.leaf(Self::across(cell.at, d)) == OUTSIDE;
                 let carriers = |c: usize| self.vertices[id].into_iter().zip(W[c]).filter(|(_, w)| *w != 0.0);
                 let chosen = || face.iter().all(|&c| carriers(c).all(|(v, _)| selected[v as usize]));
-                if outside && chosen() {
+                if self.leads_out(id as u32, d) && chosen() {
                     for &c in face {
                         carriers(c).for_each(|(v, w)| area[v as usize] += w * share);
                     }

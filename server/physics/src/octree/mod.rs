@@ -16,6 +16,7 @@ mod link_map;
 mod measures;
 mod restriction;
 mod shape;
+mod skin_faces;
 mod solid;
 mod space;
 mod surface;

@@ -300,6 +300,10 @@ impl Space for OctreeSpace {
         self.octree.areas(selected)
     }
 
+    fn for_skin_faces(&self, selected: &[bool], visit: &mut dyn FnMut(&[MaterialPoint])) {
+        self.for_boundary_faces(selected, visit);
+    }
+
     fn volumes(&self, selected: &[bool]) -> Vec<f64> {
         self.volumes.iter().zip(selected).map(|(v, &chosen)| if chosen { *v } else { 0.0 }).collect()
     }

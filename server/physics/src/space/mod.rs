@@ -151,11 +151,8 @@ pub trait Space: Any + Points + Send + Sync {
 
     /// Calls `visit` for every face of the skin all of whose nodes are `selected`, by node of the uncut body, as it is cut
     /// now. The points are those of [`Pressure::add_face`](crate::assembly::pressure::Pressure::add_face). The faces of a
-    /// cut face are its parts; lips of cuts are not skin. Returns whether there are such faces at all: without
-    /// them a body takes no pressure.
-    fn for_skin_faces(&self, _selected: &[bool], _visit: &mut dyn FnMut(&[MaterialPoint])) -> bool {
-        false
-    }
+    /// cut face are its parts; lips of cuts are not skin. Without such faces a body takes no pressure.
+    fn for_skin_faces(&self, _selected: &[bool], _visit: &mut dyn FnMut(&[MaterialPoint])) {}
 
     /// ∫ N_a dV [m³] of the `selected` nodes of the uncut body; 0 for the others.
     fn volumes(&self, selected: &[bool]) -> Vec<f64>;

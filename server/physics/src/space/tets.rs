@@ -303,9 +303,8 @@ impl Space for Tets {
         self.element.areas(self.cut.mesh(), selected)
     }
 
-    fn for_skin_faces(&self, selected: &[bool], visit: &mut dyn FnMut(&[MaterialPoint])) -> bool {
+    fn for_skin_faces(&self, selected: &[bool], visit: &mut dyn FnMut(&[MaterialPoint])) {
         self.element.for_skin_faces(&self.cut, &|copy| selected[self.node_of(copy) as usize], visit);
-        true
     }
 
     fn volumes(&self, selected: &[bool]) -> Vec<f64> {

@@ -11,6 +11,7 @@ use scindo_physics::body::{
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_hexes, box_mesh};
+use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeSettings, OctreeSpace, Shape};
 
 use crate::{SOFT, cube, settings};
 
@@ -356,6 +357,124 @@ fn a_pressure_that_does_not_act_changes_nothing() {
     }
 }
 
+/// A block of octree cells, finer at its boundary: its faces are those of hexahedra, and the force is the same.
+#[test]
+fn octree_cells_take_the_pressure_of_hexahedra() {
+    let size = Vector3::new(0.1, 0.1, 0.1);
+    let single = |element| BodySettings { element, threads: 2, ..settings(400, 1e-6) };
+    let shape = BoxShape { min: Vector3::zeros(), max: size };
+    let octree = Octree::fill(&shape, OctreeSettings { cells: 8, levels: 1 }, &|_| 0).unwrap();
+    let cells = OctreeSpace::new(octree);
+    let hexes =
+        Body::hex8(box_hexes(Vector3::zeros(), size, [8; 3]), SOFT, single(ElementKind::Hex8)).unwrap();
+    let cells = Body::of_space(Box::new(cells), SOFT, single(ElementKind::Octree)).unwrap();
+    assert!(cells.n_nodes() < hexes.n_nodes());
+    let mut found = Vec::new();
+    for mut body in [hexes, cells] {
+        let held = nodes(&body, |X| X.z == 0.0);
+        body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+        let top = nodes(&body, |X| (X.z - 0.1).abs() < 1e-9 && X.x < 0.051);
+        body.add_pressure(&top, 300.0).unwrap();
+        let pressed: Vector3<f64> = body.pressure_forces().iter().sum();
+        assert!((pressed - Vector3::new(0.0, 0.0, -1.5)).norm() < 1e-9, "{pressed}");
+        for _ in 0..50 {
+            assert_eq!(body.step(0.01, Vector3::zeros(), &[]).outcome, Outcome::Advanced);
+        }
+        let corner = nodes(&body, |X| X.x == 0.0 && X.y == 0.0 && (X.z - 0.1).abs() < 1e-9)[0] as usize;
+        found.push(body.positions()[corner] - body.rest_positions()[corner]);
+    }
+    // The interior of the octree is coarser.
+    let [hexes, cells] = found[..] else { panic!() };
+    assert!(hexes.norm() > 3e-4 && (cells - hexes).norm() < 0.01 * hexes.norm(), "{hexes} {cells}");
+}
+
+/// A ball of octree cells under pressure on all of its surface becomes smaller, as a ball does, and stays where it is:
+/// steps in its surface push against each other.
+#[test]
+fn a_ball_of_cells_is_compressed_evenly() {
+    struct Ball;
+    impl Shape for Ball {
+        fn bounds(&self) -> [Vector3<f64>; 2] {
+            [Vector3::repeat(-0.05), Vector3::repeat(0.05)]
+        }
+
+        fn contains(&self, p: &Vector3<f64>) -> bool {
+            p.norm() < 0.05
+        }
+
+        fn crossing(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Option<(f64, Vector3<f64>)> {
+            let t = (0.05 - a.norm()) / (b.norm() - a.norm());
+            Some((t, a + t * (b - a)))
+        }
+    }
+    let (p, bulk) = (300.0, SOFT.young_pa / (3.0 * (1.0 - 2.0 * SOFT.poisson)));
+    for (scheme, law) in [
+        (Scheme::Static, Law::Corotational),
+        (Scheme::Static, Law::Linear),
+        (Scheme::Bdf2, Law::Corotational),
+    ] {
+        let octree = Octree::fill(&Ball, OctreeSettings { cells: 20, levels: 2 }, &|_| 0).unwrap();
+        let settings =
+            BodySettings { scheme, element: ElementKind::Octree, pressed: true, ..settings(500, 1e-7) };
+        let mut body =
+            Body::of_space(Box::new(OctreeSpace::new(octree)), Material { law, ..SOFT }, settings).unwrap();
+        let all: Vec<u32> = (0..body.n_nodes() as u32).collect();
+        if scheme == Scheme::Static {
+            // What holds it is statically determinate, so no force acts there.
+            let near = |x: f64, y: f64| {
+                let away = |i: &u32| (body.rest_positions()[*i as usize] - Vector3::new(x, y, 0.0)).norm();
+                (0..body.n_nodes() as u32).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap()
+            };
+            let holds = [
+                (near(0.0, 0.0), [true; 3]),
+                (near(0.02, 0.0), [false, true, true]),
+                (near(0.0, 0.02), [false, false, true]),
+            ];
+            holds.iter().for_each(|&(node, held)| body.fix(&[node], held, Vector3::zeros()).unwrap());
+        }
+        body.add_pressure(&all, p).unwrap();
+        let force: Vector3<f64> = body.pressure_forces().iter().sum();
+        assert!(force.norm() < 1e-12 * p, "{force}");
+        for _ in 0..if scheme == Scheme::Static { 1 } else { 100 } {
+            assert_eq!(body.step(0.01, Vector3::zeros(), &[]).outcome, Outcome::Advanced);
+        }
+        let strain = body.volume() / body.rest_volume() - 1.0;
+        assert!((strain * bulk / p + 1.0).abs() < 0.01, "{scheme:?} {law:?}: {strain} for {}", -p / bulk);
+    }
+}
+
+/// Cuts of octree cells divide coarse ones, and leave the skin loaded and their lips bare.
+#[test]
+fn cut_cells_stay_loaded() {
+    let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(0.1) };
+    let octree = Octree::fill(&shape, OctreeSettings { cells: 12, levels: 2 }, &|_| 0).unwrap();
+    let settings = BodySettings { element: ElementKind::Octree, ..settings(100, 1e-5) };
+    let mut body = Body::of_space(Box::new(OctreeSpace::new(octree)), SOFT, settings).unwrap();
+    let held = nodes(&body, |X| X.z == 0.0);
+    body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+    let top = nodes(&body, |X| (X.z - 0.1).abs() < 1e-9);
+    body.add_pressure(&top, 100.0).unwrap();
+    let total = |body: &Body| body.pressure_forces().iter().sum::<Vector3<f64>>();
+    let whole = Vector3::new(0.0, 0.0, -1.0);
+    assert!((total(&body) - whole).norm() < 1e-9);
+    let blade = |x: f64, lean: f64| [Vector3::new(x, 0.047, 0.02), Vector3::new(x, 0.047 + lean, 0.11)];
+    for (incision, lean) in [(1, 0.0), (2, 0.02)] {
+        let copies = body.n_copies();
+        body.cut(&BladeSweep { segments: vec![blade(-0.01, lean), blade(0.11, lean)] }, incision).unwrap();
+        assert!(body.n_copies() > copies && (total(&body) - whole).norm() < 1e-9, "{}", total(&body));
+    }
+    // Refinement makes corners of faces vertices of their own.
+    let near = AdaptSettings { distance_m: Some([0.03, 0.05]), ..AdaptSettings::default() };
+    let refined = body.adapt(&near, &[Vector3::new(0.08, 0.08, 0.08)], None).unwrap();
+    assert!(refined.divided > 0 && (total(&body) - whole).norm() < 1e-9, "{refined:?} {}", total(&body));
+    for _ in 0..5 {
+        assert_eq!(body.step(0.01, Vector3::zeros(), &[]).outcome, Outcome::Advanced);
+    }
+    assert!((total(&body) - whole).norm() > 1e-6, "it follows the deformed skin");
+    body.reset().unwrap();
+    assert!((total(&body) - whole).norm() < 1e-9);
+}
+
 #[test]
 fn what_pressure_does_not_go_with_is_refused() {
     let mut body = cube(2, SOFT, settings(50, 1e-6));
@@ -371,5 +490,14 @@ fn what_pressure_does_not_go_with_is_refused() {
     assert!(refused(&mut cube(2, SOFT, relaxed), &all, 10.0).contains("relaxation"));
     let linear = Material { law: Law::Linear, ..SOFT };
     cube(2, linear, relaxed).add_pressure(&all, 10.0).unwrap();
+    let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(0.1) };
+    let cells = |pressed: bool| {
+        let octree = Octree::fill(&shape, OctreeSettings { cells: 4, levels: 0 }, &|_| 0).unwrap();
+        let scheme = Scheme::Static;
+        let settings = BodySettings { scheme, pressed, element: ElementKind::Octree, ..settings(50, 1e-5) };
+        Body::of_space(Box::new(OctreeSpace::new(octree)), SOFT, settings).unwrap()
+    };
+    assert!(refused(&mut cells(false), &all, 10.0).contains("equilibria on the fast path"));
+    cells(true).add_pressure(&all, 10.0).unwrap();
     assert!(body.pressure_forces().iter().all(|f| *f == Vector3::zeros()));
 }

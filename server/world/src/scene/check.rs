@@ -308,10 +308,6 @@ impl Check<'_> {
             let what = "found `share` beside pressure_pa, which acts on faces; allowed with force_n only";
             self.conflict(format!("{at}.share"), what, "remove it");
         }
-        if body.element == RawElement::Octree {
-            let what = "found a pressure on octree cells, whose faces are not their surface; allowed: tet4, tet10, hex8";
-            self.conflict(key.clone(), what, "choose another element, or give a force_n");
-        }
         if body.cut_method().changes_mesh() {
             let what = format!(
                 "found a pressure with cutting.method = `{}`, which changes the mesh; allowed there: constant forces",

@@ -38,6 +38,8 @@ pub struct Mechanics {
     pub fibres: Fibres,
     /// Terms of a Prony series.
     pub prony: Prony,
+    /// Whether a load is a pressure.
+    pub pressed: bool,
     /// Time integration.
     pub integrator: RawIntegrator,
     /// Parameters of Newmark's method, used by it alone.
@@ -145,6 +147,7 @@ impl Mechanics {
             cubes: self.element == RawElement::Hex8 && self.cubes,
             fibres: self.fibres,
             prony: self.prony,
+            pressed: self.pressed,
             volumetric: match self.locking {
                 RawLocking::None => Volumetric::Full,
                 RawLocking::NodeAveraged => Volumetric::NodeAveraged { kept: KEPT },

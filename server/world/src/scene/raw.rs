@@ -390,7 +390,8 @@ pub struct RawLoad {
     pub force_n: Option<Vec3>,
     /// Pressure [Pa] on the boundary faces all of whose nodes are selected. It pushes into the body; a negative one
     /// pulls. It follows the deformed surface, except with the law `linear`, where it keeps the directions and areas
-    /// of the body at rest. Cut faces carry none. Not for octree cells, nor with cuts that change the mesh.
+    /// of the body at rest. Cut faces carry none. It acts on the
+    /// outer faces of octree cells, so its place is known to a cell. Not with cuts that change the mesh.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9), extend("x-next" = "blood in arteries has about 13000 (100 mmHg)"))]
     pub pressure_pa: Option<f64>,

@@ -35,7 +35,7 @@ fn faces(body: &Body, on: impl Fn(&Vector3<f64>) -> bool) -> (Pressure, Vec<Vect
     let selected: Vec<bool> = body.rest_positions().iter().map(on).collect();
     let mut pressure = Pressure::default();
     let load = pressure.add_load(PASCALS);
-    assert!(space.for_skin_faces(&selected, &mut |points| pressure.add_face(load, points)));
+    space.for_skin_faces(&selected, &mut |points| pressure.add_face(load, points));
     (pressure, body.rest_positions().to_vec())
 }
 

@@ -20,6 +20,7 @@ impl Check<'_> {
             prony: Prony::new(
                 body.prony.iter().map(|&RawProny { ratio, time_s }| PronyTerm { ratio, time_s }),
             ),
+            pressed: body.load.iter().any(|load| load.pressure_pa.is_some()),
             integrator: body.integrator,
             newmark: Newmark { beta: newmark.beta, gamma: newmark.gamma },
             mass: body.mass,
