@@ -14,7 +14,8 @@ use crate::team::{Team, blocks};
 pub struct PcgSettings {
     /// Largest number of iterations, each one application of A.
     pub iterations: u32,
-    /// Stop at √(rᵀM⁻¹r) ≤ tolerance · reference.
+    /// Stop at √(rᵀM⁻¹r) ≤ tolerance · reference. 0 asks for all iterations; a preconditioner that costs products is
+    /// then not applied after the last one, and the reported residual is that before it.
     pub tolerance: f64,
 }
 
@@ -31,6 +32,8 @@ pub struct Pcg {
     /// rᵀM⁻¹r and β where the last run ended.
     rz: f64,
     beta: f64,
+    /// Whether M⁻¹ has not been applied since x changed last; `rz` is that before then.
+    owed: bool,
 }
 
 impl Pcg {
@@ -69,7 +72,7 @@ impl Pcg {
         x: &mut [Padded],
         (rz, reference, settings): (f64, f64, PcgSettings),
     ) -> LinearReport {
-        (self.rz, self.beta) = (rz, 0.0);
+        (self.rz, self.beta, self.owed) = (rz, 0.0, false);
         self.go_on(team, A, M, x, (reference, settings))
     }
 
@@ -83,6 +86,10 @@ impl Pcg {
         x: &mut [Padded],
         (reference, settings): (f64, PcgSettings),
     ) -> LinearReport {
+        if std::mem::take(&mut self.owed) {
+            let next = M.apply(team, A, &self.r, &mut self.z, &mut self.partial);
+            (self.rz, self.beta) = (next, next / self.rz);
+        }
         let (mut rz, mut beta) = (self.rz, self.beta);
         let target = settings.tolerance * reference;
         let mut report = LinearReport::default();
@@ -118,12 +125,18 @@ impl Pcg {
             let alpha = rz / curvature;
             error.add(alpha * rz);
             report.algebraic_error = error.norm();
+            report.iterations += 1;
+            if settings.tolerance == 0.0 && report.iterations == settings.iterations && M.uses_operator() {
+                let Self { r, z, p, q, partial, .. } = self;
+                Iterate { x, r, z, partial }.along(team, alpha as f32, [p, q]);
+                self.owed = true;
+                return report;
+            }
             let next = self.descend(team, A, M, alpha, x);
             beta = next / rz;
             rz = next;
             // Kept for a later continuation.
             (self.rz, self.beta) = (rz, beta);
-            report.iterations += 1;
         }
     }
 
@@ -246,5 +259,62 @@ mod tests {
         let (report, x) = solve(-1.0, 1000, 300);
         assert_eq!(report.stop, StopReason::NonPositiveCurvature);
         assert!(x.iter().flatten().all(|v| v.is_finite()));
+    }
+
+    /// A preconditioner that costs products, by its own account.
+    struct Dear {
+        jacobi: BlockJacobi,
+        applied: usize,
+    }
+
+    impl Preconditioner for Dear {
+        fn uses_operator(&self) -> bool {
+            true
+        }
+
+        fn apply(
+            &mut self,
+            team: &mut Team,
+            A: &mut dyn LinearOperator,
+            r: &[Padded],
+            z: &mut [Padded],
+            partial: &mut [f64],
+        ) -> f64 {
+            self.applied += 1;
+            self.jacobi.apply(team, A, r, z, partial)
+        }
+    }
+
+    /// A fixed number of iterations ends without another application, which the next run makes up for.
+    #[test]
+    fn a_dear_preconditioner_is_applied_once_per_iteration() {
+        let n = 300;
+        let run = |parts: &[u32]| {
+            let (mut team, mut A) = (Team::new(1).unwrap(), Chain { shift: 0.01 });
+            let mut jacobi = BlockJacobi::default();
+            jacobi.resize(n);
+            jacobi.update(&mut team, &vec![[2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0, 0.0]; n], &[]);
+            let mut M = Dear { jacobi, applied: 0 };
+            let (mut pcg, mut x) = (Pcg::default(), vec![[0.0; 4]; n]);
+            pcg.resize(n);
+            (0..n).for_each(|i| pcg.r[i] = [1.0, (i as f32).sin(), 0.5, 0.0]);
+            let mut start = Some(pcg.precondition(&mut team, &mut A, &mut M));
+            let mut residuals = Vec::new();
+            for &iterations in parts {
+                let settings = PcgSettings { iterations, tolerance: 0.0 };
+                let report = match start.take() {
+                    Some(rz) => pcg.run(&mut team, &mut A, &mut M, &mut x, (rz, 1.0, settings)),
+                    None => pcg.go_on(&mut team, &mut A, &mut M, &mut x, (1.0, settings)),
+                };
+                assert_eq!((report.stop, report.iterations), (StopReason::IterationLimit, iterations));
+                residuals.push(report.residual);
+            }
+            (M.applied, x, residuals)
+        };
+        let (applied, x, whole) = run(&[10]);
+        let (in_parts, same, parts) = run(&[1, 4, 5]);
+        assert_eq!((applied, in_parts), (10, 10));
+        assert_eq!(x, same);
+        assert_eq!(whole[0], parts[2]);
     }
 }
