@@ -1,7 +1,9 @@
 //! Figure 10: how cycles converge on the cube uncut and cut by aligned and rotated blades, and with less and less
 //! mass.
 
-use scindo_physics::solver::multigrid::Smoother;
+use std::time::Instant;
+
+use scindo_physics::solver::multigrid::MultigridSettings;
 
 use super::model::{CUBE, Cuts, Grid, Model, animal, cube};
 use super::printed::RATES;
@@ -34,12 +36,15 @@ pub fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, 
     let mut rates = Table::new(
         "Rates",
         "Mean factor per cycle from cycle 8 to 24. SOR is the smoother of the paper, V(1,1) and ω = 1.7; Chebyshev \
-         is the default.",
+         is the default. Its W-cycle works twice on every coarse level; how much longer than its V-cycle it takes is \
+         beside it.",
         &[
             ("cells", Unit::Count),
             ("SOR", Unit::Number),
             ("Chebyshev", Unit::Number),
+            ("W-cycle", Unit::Number),
             ("paper", Unit::Number),
+            ("W over V", Unit::Times),
         ],
     );
     let (across, levels) = if bench.is_quick() { (32, 3) } else { (CUBE, 4) };
@@ -54,13 +59,12 @@ pub fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, 
             let model = cube(across, levels, grid)?;
             let (cells, found) = of(&model, problem, grid.name(), &mut charts)?;
             let printed = Some(printed).filter(|_| problem != Problem::Equilibrium);
-            rates.row(
-                format!("{}, {}", model.name, problem.words()),
-                &[Some(cells), Some(found[0]), Some(found[1]), printed],
-            );
+            rates.row(format!("{}, {}", model.name, problem.words()), &row(cells, &found, printed));
         }
         result.plots.push(Plots {
-            caption: format!("The cube {caption}: error over cycles, left with SOR, right with Chebyshev."),
+            caption: format!(
+                "The cube {caption}: error over cycles; SOR, Chebyshev, and Chebyshev in W-cycles."
+            ),
             charts: charts.into(),
             ..Plots::default()
         });
@@ -74,10 +78,7 @@ pub fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, 
     for problem in [Problem::Equilibrium].into_iter().chain(MASSES.map(Problem::Step)) {
         bench.begin(format!("animal, {}", problem.words()), total)?;
         let (cells, found) = of(&model, problem, &problem.words(), &mut charts)?;
-        rates.row(
-            format!("{}, {}", model.name, problem.words()),
-            &[Some(cells), Some(found[0]), Some(found[1]), None],
-        );
+        rates.row(format!("{}, {}", model.name, problem.words()), &row(cells, &found, None));
     }
     result.plots.push(Plots {
         caption:
@@ -91,35 +92,43 @@ pub fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, 
     Ok(result)
 }
 
-fn charts(what: &str) -> [Chart; 2] {
-    smoothers().map(|(name, _)| {
+/// The cycles that are compared, with their names.
+fn kinds() -> [(&'static str, MultigridSettings); 3] {
+    let default = MultigridSettings::default();
+    let [sor, chebyshev] =
+        smoothers().map(|(name, smoother)| (name, MultigridSettings { smoother, ..default }));
+    [sor, chebyshev, ("W-cycle", MultigridSettings { visits: 2, ..default })]
+}
+
+/// Rates of the cycles, and seconds of each.
+type Found = [(f64, f64); 3];
+
+fn row(cells: f64, found: &Found, printed: Option<f64>) -> [Option<f64>; 6] {
+    let [sor, v, w] = *found;
+    [Some(cells), Some(sor.0), Some(v.0), Some(w.0), printed, Some(w.1 / v.1)]
+}
+
+fn charts(what: &str) -> [Chart; 3] {
+    kinds().map(|(name, _)| {
         let mut chart = Chart::new(&format!("{what}, {name}"), "cycles", "‖e‖/‖e₀‖");
         chart.logarithmic = true;
         chart
     })
 }
 
-/// Cells and rates of a cut model with both smoothers; the errors become lines of the charts.
-fn of(
-    model: &Model,
-    problem: Problem,
-    name: &str,
-    charts: &mut [Chart; 2],
-) -> Result<(f64, [f64; 2]), Trouble> {
+/// Cells and rates of a cut model with all cycles; the errors become lines of the charts.
+fn of(model: &Model, problem: Problem, name: &str, charts: &mut [Chart; 3]) -> Result<(f64, Found), Trouble> {
     let cut = model.cut()?;
     let mut system = System::new(cut.space.octree(), (model.held, model.pull), problem)?;
     let (exact, _) = system.converged();
-    let mut found = [0.0; 2];
-    for (((_, smoother), chart), found) in smoothers().into_iter().zip(charts).zip(&mut found) {
-        let norms = norms(&mut system, smoother, &exact);
-        *found = rate(&norms, STABLE);
+    let mut found = [(0.0, 0.0); 3];
+    for (((_, settings), chart), found) in kinds().into_iter().zip(charts).zip(&mut found) {
+        let (mut multigrid, _) = system.multigrid_with(settings);
+        let started = Instant::now();
+        let norms = decay(&mut system, &mut multigrid, &exact, CYCLES);
+        *found = (rate(&norms, STABLE), started.elapsed().as_secs_f64() / CYCLES as f64);
         let points = (0..).zip(&norms).map(|(k, e)| [f64::from(k), *e]).collect();
         chart.lines.push(Line { name: name.to_owned(), points });
     }
     Ok((cut.space.octree().cells().len() as f64, found))
-}
-
-fn norms(system: &mut System, smoother: Smoother, exact: &[nalgebra::Vector3<f64>]) -> Vec<f64> {
-    let (mut multigrid, _) = system.multigrid(smoother);
-    decay(system, &mut multigrid, exact, CYCLES)
 }

@@ -228,17 +228,21 @@ impl System {
 
     /// Multigrid with this smoother, and the seconds that its levels and operators took.
     pub fn multigrid(&mut self, smoother: Smoother) -> (Multigrid, Seconds) {
-        self.multigrid_on(Hierarchy::new, smoother)
+        self.multigrid_with(MultigridSettings { smoother, ..MultigridSettings::default() })
+    }
+
+    /// The same with other settings.
+    pub fn multigrid_with(&mut self, settings: MultigridSettings) -> (Multigrid, Seconds) {
+        self.multigrid_on(Hierarchy::new, settings)
     }
 
     /// The same with another way to make the levels.
     pub fn multigrid_on(
         &mut self,
         levels: impl Fn(&Octree) -> Hierarchy,
-        smoother: Smoother,
+        settings: MultigridSettings,
     ) -> (Multigrid, Seconds) {
         let started = Instant::now();
-        let settings = MultigridSettings { smoother, ..MultigridSettings::default() };
         let mut multigrid = Multigrid::new(levels(&self.octree), settings);
         let levels = started.elapsed().as_secs_f64();
         let material =
@@ -255,7 +259,7 @@ impl System {
         multigrid.update(&mut self.team, (&with, &self.fixed), &|_| Matrix3::identity());
         let coarse = started.elapsed().as_secs_f64();
         let started = Instant::now();
-        if let Smoother::Chebyshev { .. } = smoother {
+        if let Smoother::Chebyshev { .. } = settings.smoother {
             let (mut A, jacobi, team) = self.parts();
             multigrid.estimate_eigenvalues(team, &mut A, jacobi.inverses());
         }

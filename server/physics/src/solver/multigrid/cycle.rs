@@ -1,4 +1,4 @@
-//! V-cycles over the levels of a body.
+//! Cycles over the levels of a body.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -35,6 +35,9 @@ pub struct MultigridSettings {
     /// Whether matrices of coarse cells are rounded to half precision where smoothing multiplies with them: cycles
     /// wait for memory less. Coarser matrices are made of those in single precision.
     pub half_precision: bool,
+    /// How often a cycle works on every coarse level before it goes back to the finer one: once in a V-cycle, twice in a
+    /// W-cycle. The coarsest level is solved each time.
+    pub visits: u8,
     /// Instructions of the kernels.
     pub simd: Simd,
 }
@@ -45,6 +48,7 @@ impl Default for MultigridSettings {
             smoother: Smoother::default(),
             same_rotation_rad: 0.1,
             half_precision: true,
+            visits: 1,
             simd: Simd::detect(),
         }
     }
@@ -96,6 +100,8 @@ pub struct Vectors {
     r: Vec<Padded>,
     d: Vec<Padded>,
     q: Vec<Padded>,
+    /// Right-hand side, and solution so far, of levels that are visited more than once.
+    whole: [Vec<Padded>; 2],
     /// Below the level that is solved on its operator.
     pub(super) kernel: Option<LevelKernel>,
     /// Stiff springs.
@@ -106,9 +112,19 @@ pub struct Vectors {
 impl Vectors {
     /// Follows the `change` of level `l`, which has `n` vertices now; the equations are on level `first`.
     fn follow(&mut self, (l, first): (usize, usize), n: usize, change: &LevelChange) {
-        let Self { inverse, x, b, r, d, q, kernel, .. } = self;
+        let Self { inverse, x, b, r, d, q, kernel, whole: [all, known], .. } = self;
         let inner = l > 0 && l != first;
-        for (vector, used) in [(x, inner), (b, inner), (r, l >= first), (d, l >= first), (q, l >= first)] {
+        let again = !all.is_empty();
+        let vectors = [
+            (x, inner),
+            (b, inner),
+            (r, l >= first),
+            (d, l >= first),
+            (q, l >= first),
+            (all, again),
+            (known, again),
+        ];
+        for (vector, used) in vectors {
             if used {
                 resize_reserving(vector, n, [0.0; 4]);
             }
@@ -155,6 +171,7 @@ impl Multigrid {
                 r: zeros(),
                 d: zeros(),
                 q: zeros(),
+                whole: [(); 2].map(|()| if_needed(l > first && settings.visits > 1)),
                 kernel,
                 columns: Columns::default(),
                 spring_blocks: SpringBlocks::default(),
@@ -415,38 +432,61 @@ impl Multigrid {
         r: &[Padded],
         z: &mut [Padded],
     ) {
-        let (first, last) = (self.first, self.levels.len() - 1);
-        // Down: smooth, restrict the residual.
-        for l in first..last {
-            if l == first {
-                self.smooth(team, A, (l, inverse, largest), (r, z), true);
-            } else {
-                self.smooth_inner(team, A, l, true);
-            }
-            let (fine, coarse) = self.levels.split_at_mut(l + 1);
-            let (r, b) = (&fine[l].r, &mut coarse[0].b);
-            self.hierarchy.steps[l].transfer.restrict(team, r, b);
-            self.galerkin.levels[l + 1].restrict_inner(team, &self.hierarchy.levels[l + 1], r, b);
-        }
-        if last == first {
+        let first = self.first;
+        if first + 1 == self.levels.len() {
             z.fill([0.0; 4]);
             return self.solve_coarsest(team, A, (inverse, largest), Some((r, z)));
         }
-        self.solve_coarsest(team, A, (inverse, largest), None);
-        // Up: correct, smooth.
-        for l in (first..last).rev() {
-            let (fine, coarse) = self.levels.split_at_mut(l + 1);
-            let transfer = &self.hierarchy.steps[l].transfer;
-            let (e, d) = (&coarse[0].x, &mut fine[l].d);
-            transfer.prolong(team, e, d);
-            self.galerkin.levels[l + 1].prolong_inner(team, &self.hierarchy.levels[l + 1], e, d);
-            if l == first {
-                filter(&self.fixed, d);
-                self.smooth(team, A, (l, inverse, largest), (r, z), false);
-            } else {
-                self.smooth_inner(team, A, l, false);
+        self.smooth(team, A, (first, inverse, largest), (r, z), true);
+        self.correct(team, A, first);
+        filter(&self.fixed, &mut self.levels[first].d);
+        self.smooth(team, A, (first, inverse, largest), (r, z), false);
+    }
+
+    /// Restricts the residual of level `l`, solves on the next one, and leaves the correction in `d`.
+    fn correct(&mut self, team: &mut Team, A: &mut dyn LinearOperator, l: usize) {
+        let (fine, coarse) = self.levels.split_at_mut(l + 1);
+        let (r, b) = (&fine[l].r, &mut coarse[0].b);
+        let (transfer, level) = (&self.hierarchy.steps[l].transfer, &self.hierarchy.levels[l + 1]);
+        transfer.restrict(team, r, b);
+        self.galerkin.levels[l + 1].restrict_inner(team, level, r, b);
+        self.solve_level(team, A, l + 1);
+        let (fine, coarse) = self.levels.split_at_mut(l + 1);
+        let (e, d) = (&coarse[0].x, &mut fine[l].d);
+        let (transfer, level) = (&self.hierarchy.steps[l].transfer, &self.hierarchy.levels[l + 1]);
+        transfer.prolong(team, e, d);
+        self.galerkin.levels[l + 1].prolong_inner(team, level, e, d);
+    }
+
+    /// x ≈ A⁻¹ b on a coarse level.
+    fn solve_level(&mut self, team: &mut Team, A: &mut dyn LinearOperator, l: usize) {
+        if l + 1 == self.levels.len() {
+            return self.solve_coarsest(team, A, (&[], 0.0), None);
+        }
+        self.visit(team, A, l);
+        for again in 1..self.settings.visits {
+            let Vectors { x, b, q, whole: [all, known], kernel, columns, .. } = &mut self.levels[l];
+            let Some(kernel) = kernel else { return };
+            if again == 1 {
+                all.copy_from_slice(b);
+            }
+            known.copy_from_slice(x);
+            b.copy_from_slice(all);
+            LevelSystem { kernel, mass: &self.galerkin.levels[l].mass, columns }.apply(team, x, q);
+            subtract(b, q);
+            self.visit(team, A, l);
+            let Vectors { x, whole: [_, known], .. } = &mut self.levels[l];
+            for (x, known) in x.iter_mut().zip(known) {
+                (0..4).for_each(|k| x[k] += known[k]);
             }
         }
+    }
+
+    /// One cycle from 0 on a coarse level.
+    fn visit(&mut self, team: &mut Team, A: &mut dyn LinearOperator, l: usize) {
+        self.smooth_inner(team, A, l, true);
+        self.correct(team, A, l);
+        self.smooth_inner(team, A, l, false);
     }
 
     fn smooth_inner(&mut self, team: &mut Team, A: &mut dyn LinearOperator, l: usize, before: bool) {
@@ -513,7 +553,7 @@ impl Multigrid {
         let Self { galerkin, coarsest, levels, .. } = self;
         let last = levels.len() - 1;
         let is_outer = outer.is_some();
-        let Vectors { inverse: own, largest: known, x, b, r, d, q, kernel, columns, spring_blocks } =
+        let Vectors { inverse: own, largest: known, x, b, r, d, q, kernel, columns, spring_blocks, .. } =
             &mut levels[last];
         let columns = &*columns;
         let (b, x, inverse) = match outer {
@@ -566,8 +606,9 @@ impl Multigrid {
     /// Bytes in use: all but stored matrices, and these. The factor of the coarsest level is left out.
     pub fn memory(&self) -> [usize; 2] {
         let vectors = |level: &Vectors| {
-            let Vectors { inverse, x, b, r, d, q, .. } = level;
-            size_of_val(&inverse[..]) + [x, b, r, d, q].iter().map(|v| size_of_val(&v[..])).sum::<usize>()
+            let Vectors { inverse, x, b, r, d, q, whole: [all, known], .. } = level;
+            size_of_val(&inverse[..])
+                + [x, b, r, d, q, all, known].iter().map(|v| size_of_val(&v[..])).sum::<usize>()
         };
         let kernels = self.levels.iter().filter_map(|level| level.kernel.as_ref()).map(LevelKernel::memory);
         let parts = kernels.chain([self.galerkin.memory()]);

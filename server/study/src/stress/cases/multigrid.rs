@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use scindo_physics::element::Points;
 use scindo_physics::octree::{At, CutLink, Octree, OctreeSpace};
-use scindo_physics::solver::multigrid::{Hierarchy, Smoother};
+use scindo_physics::solver::multigrid::{Hierarchy, MultigridSettings};
 use scindo_physics::space::Space;
 use scindo_physics::team::Team;
 
@@ -65,7 +65,7 @@ fn blades(setting: &Setting) -> Result<Evidence, Trouble> {
         let whole = if setting.ablation.duplicates { Hierarchy::without_duplicates } else { Hierarchy::new };
         let mut iterations = [0.0; 2];
         for (levels, found) in [whole, Hierarchy::without_duplicates].into_iter().zip(&mut iterations) {
-            let (mut multigrid, _) = system.multigrid_on(levels, Smoother::default());
+            let (mut multigrid, _) = system.multigrid_on(levels, MultigridSettings::default());
             let norms = decay(&mut system, &mut multigrid, &exact, STABLE[1]);
             let until = Until { iterations: 200, error: 3e-6, seconds: 0.0 };
             let course = run(&mut system, Solver::Preconditioned(&mut multigrid), &exact, until);

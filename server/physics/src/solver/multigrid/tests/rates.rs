@@ -93,6 +93,23 @@ fn half_precision_keeps_the_rate() {
     }
 }
 
+/// A W-cycle takes fewer turns where cuts leave the coarse levels with bad corrections, and stays symmetric.
+#[test]
+fn visiting_coarse_levels_twice_helps_where_much_is_cut() {
+    let mut octree = cube(32, 2);
+    blade_grid(&mut octree, &[5, 9, 14, 18, 23, 27]);
+    let [once, twice, thrice] = [1, 2, 3].map(|visits| {
+        let settings = MultigridSettings { visits, ..MultigridSettings::default() };
+        let mut scene = Scene::new(&octree, coefficients(0.3, 0.0), &clamped(&octree, 2), settings);
+        assert!(scene.multigrid.report().0.len() > 3);
+        assert_cycle_is_symmetric(&mut scene);
+        measured(scene)
+    });
+    let found = format!("{once:.3?} {twice:.3?} {thrice:.3?}");
+    assert!(twice.0 < once.0 && twice.1 < once.1 && thrice.0 < twice.0, "{found}");
+    println!("{found}");
+}
+
 #[test]
 fn without_duplicates_cuts_slow_the_cycle_down() {
     let mut octree = cube(16, 0);
