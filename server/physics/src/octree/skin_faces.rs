@@ -29,10 +29,10 @@ impl OctreeSpace {
         for (id, cell) in (0_u32..).zip(octree.cells()).filter(|(_, cell)| cell.cut != 0) {
             // Cells at the boundary are finest ones from the beginning.
             let before = uncut.leaf(cell.at) as usize;
+            let W = corner_weights(&uncut.cells()[before], uncut.hanging()[before]);
+            let carry = |c: usize| uncut.vertices()[before].into_iter().zip(W[c]);
+            let chosen = |c: &usize| carry(*c).all(|(v, w)| w == 0.0 || selected[v as usize]);
             for d in (0..6).filter(|&d| octree.leads_out(id, d)) {
-                let W = corner_weights(&uncut.cells()[before], uncut.hanging()[before]);
-                let carry = |c: usize| uncut.vertices()[before].into_iter().zip(W[c]);
-                let chosen = |c: &usize| carry(*c).all(|(v, w)| w == 0.0 || selected[v as usize]);
                 if FACES[d].iter().all(chosen) {
                     let corner = |c: usize| [0, 1, 2].map(|k| (c >> k & 1) as f64);
                     visit(&around(d).map(|c| octree.point_in(id, corner(c))));

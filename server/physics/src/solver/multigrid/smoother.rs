@@ -87,8 +87,7 @@ pub struct Diagonal<'a> {
     pub sprung: Option<Sprung<'a>>,
 }
 
-/// One step of a polynomial: its number from 0 on, what it starts from, and the factors of d, of D⁻¹r and of the new d in
-/// x.
+/// One step of a polynomial: what it starts from, and the factors of d, of D⁻¹r, and of the new d in x.
 type Step = (Start, [f32; 3]);
 
 /// d ← (2k − 3)/(2k + 1) d + (8k − 4)/(2k + 1)/λ D⁻¹ r, x ← x + β d with k = `i` + 1.
@@ -110,7 +109,7 @@ pub fn chebyshev(
     (mut v, stage): (Smoothing<'_>, Stage),
 ) {
     let largest = diagonal.largest;
-    let mut fresh = true;
+    let mut first = stage != Stage::After;
     for i in 0..degree {
         let start = match (i, stage) {
             (0, Stage::After) => Start::Correction,
@@ -121,8 +120,8 @@ pub fn chebyshev(
         if start == Start::Zero {
             v.begin(team, step, &diagonal);
         } else {
-            v.go_on(team, A, (stage != Stage::After && fresh, Some(step)), &diagonal);
-            fresh = false;
+            v.go_on(team, A, (first, Some(step)), &diagonal);
+            first = false;
         }
         if let Some(Sprung { columns, blocks }) = &mut diagonal.sprung {
             let r = if start == Start::Zero { v.b } else { &*v.r };
@@ -136,7 +135,7 @@ pub fn chebyshev(
         }
     }
     if stage == Stage::Before {
-        v.go_on(team, A, (fresh, None), &diagonal);
+        v.go_on(team, A, (first, None), &diagonal);
     }
 }
 
@@ -150,18 +149,18 @@ impl Smoothing<'_> {
         });
     }
 
-    /// r ← r − A d, or b − A d if r is not `fresh` yet, and a `step` from there.
+    /// r ← r − A d, or b − A d for the `first` residual, and a `step` from there.
     fn go_on(
         &mut self,
         team: &mut Team,
         A: &mut dyn LinearOperator,
-        (fresh, step): (bool, Option<Step>),
+        (first, step): (bool, Option<Step>),
         diagonal: &Diagonal<'_>,
     ) {
         let Self { b, x, r, d, q, .. } = self;
         let (b, inverse) = (&**b, diagonal.inverse);
         let follow = |block: usize, q: &[Padded], [r, d, x]: [&mut [Padded]; 3]| {
-            if fresh {
+            if first {
                 r.copy_from_slice(block_of(b, block));
             }
             subtract(r, q);

@@ -107,7 +107,6 @@ fn visiting_coarse_levels_twice_helps_where_much_is_cut() {
     });
     let found = format!("{once:.3?} {twice:.3?} {thrice:.3?}");
     assert!(twice.0 < once.0 && twice.1 < once.1 && thrice.0 < twice.0, "{found}");
-    println!("{found}");
 }
 
 #[test]
