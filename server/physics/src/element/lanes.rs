@@ -133,6 +133,26 @@ pub trait Batched<const N: usize>: Vector {
     /// All ids are below the length of `x`.
     unsafe fn gather_all_edges<B>(x: &[[f64; 4]], from: &[B; N], ids: impl Fn(&B) -> [&Ids; 2]) -> [Self; 3];
 
+    /// [`Vector8::scatter`] of M vectors of each lane, for one batch after the other. `ids` are those of a batch.
+    ///
+    /// # Safety
+    /// All ids are below the length of `y`.
+    #[inline(always)]
+    unsafe fn scatter_all<'a, const M: usize>(
+        y: &mut [[f32; 4]],
+        ids: impl Fn(usize) -> [&'a Ids; M],
+        f: &[[Self; 3]; M],
+    ) {
+        for batch in 0..N {
+            let ids = ids(batch);
+            for m in 0..M {
+                let part = [f[m][0].part(batch), f[m][1].part(batch), f[m][2].part(batch)];
+                // SAFETY: the caller's promise.
+                unsafe { Self::Part::scatter(y, ids[m], part) };
+            }
+        }
+    }
+
     /// Writes a field of every batch.
     #[inline(always)]
     fn write<B>(self, to: &mut [B; N], field: impl Fn(&mut B) -> &mut Lanes) {

@@ -5,8 +5,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::chunks::{NO_PIECE, pack, plan_chunk};
 use super::edges::EdgeBlocks;
-use super::kernel::{Batches, Block6, Coefficients, EnergyCoefficients, Locals, RestBatch};
+use super::kernel::Batches;
 use super::shared_lanes::Merged;
+use super::strips::{AS_IN_MESH, Corners};
+use super::tet_batch::{Block6, Coefficients, EnergyCoefficients, Locals, RestBatch};
 use super::{Padded, padded};
 use crate::element::{LANES, Simd};
 use crate::mesh::TetMesh;
@@ -23,6 +25,8 @@ pub struct Chunk {
     /// Copy of every local number, ascending. The last local number is the waste bin of unused lanes.
     pub copies: Vec<u32>,
     pieces: Vec<[u32; LANES]>,
+    /// Order of the corners in every lane of the first batches, those of strips; elsewhere it is that of the mesh.
+    corners: Vec<[Corners; LANES]>,
     batches: Batches,
     positions: Vec<[f64; 4]>,
     /// Vector that the stiffness is applied to, by local number.
@@ -59,11 +63,12 @@ impl Chunk {
         let plan = plan_chunk(&pieces, |p| merged[p as usize].piece.copies);
         // Spare capacity for what cuts add before the next plan.
         let mut rest = Vec::with_capacity(plan.pieces.len() + plan.pieces.len() / 4 + 1);
-        for lanes in &plan.pieces {
+        for (b, lanes) in plan.pieces.iter().enumerate() {
             let mut batch = RestBatch::empty();
             for (lane, &p) in lanes.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
                 let rotation = pieces.binary_search(&p).ok().map(|at| &members[at].rotation);
-                batch.set(lane, mesh, &merged[p as usize], rotation);
+                let corners = plan.corners.get(b).map_or(AS_IN_MESH, |lanes| lanes[lane]);
+                batch.set(lane, mesh, (&merged[p as usize], corners), rotation);
             }
             rest.push(batch);
         }
@@ -73,7 +78,8 @@ impl Chunk {
         resize_reserving(&mut positions, n, [0.0; 4]);
         Self {
             group,
-            batches: Batches::new(&plan.nodes, rest, n),
+            corners: plan.corners,
+            batches: Batches::new(&plan.nodes, rest, n, plan.n_strips),
             pieces: plan.pieces,
             rest: rest_positions(&plan.copies, &pieces, mesh, merged),
             edges: None,
@@ -154,13 +160,19 @@ impl Chunk {
         let places = free_lanes(&mut self.pieces, added, &held, n);
         self.batches.grow(self.pieces.len(), n);
         for (p, batch, lane) in amended {
-            self.batches.set_nodes(batch, lane, locals(p));
+            let (ids, corners) = (locals(p), self.corners.get(batch).map_or(AS_IN_MESH, |lanes| lanes[lane]));
+            self.batches.set_nodes(batch, lane, corners.map(|c| ids[c as usize]));
             self.batches.rest_mut(batch).set_volume(lane, mesh, &merged[p as usize]);
             self.unassembled.push([batch, lane]);
         }
         for (([batch, lane], ids), NewLane { piece, rotation }) in places.into_iter().zip(held).zip(added) {
             self.batches.set_nodes(batch, lane, ids);
-            self.batches.rest_mut(batch).set(lane, mesh, &merged[*piece as usize], Some(rotation));
+            self.batches.rest_mut(batch).set(
+                lane,
+                mesh,
+                (&merged[*piece as usize], AS_IN_MESH),
+                Some(rotation),
+            );
             self.unassembled.push([batch, lane]);
         }
         self.n_lanes += added.len();

@@ -5,6 +5,7 @@
 //! vectors of its own; copies on the border of chunks are then added up in chunk order.
 
 use super::BLOCK;
+use super::strips::{Corners, NODES as STRIP_NODES, TETS as STRIP_TETS, find_strips};
 use crate::element::{Ids, LANES};
 use crate::storage::reserve::resize_reserving;
 
@@ -21,6 +22,10 @@ pub struct ChunkPlan {
     /// Copy of every local number, ascending. One more number, `copies.len()`, is the waste bin: unused
     /// lanes read and write there.
     pub copies: Vec<u32>,
+    /// Number of pairs of batches of strips; their tets fill the first batches, six for each pair.
+    pub n_strips: usize,
+    /// Order of the corners in every lane of those batches.
+    pub corners: Vec<[Corners; LANES]>,
     /// Piece in every lane of every batch, or [`NO_PIECE`].
     pub pieces: Vec<[u32; LANES]>,
     /// Local numbers of the four copies of every lane.
@@ -36,17 +41,60 @@ pub fn plan_chunk(chunk: &[u32], copies_of: impl Fn(u32) -> [u32; 4]) -> ChunkPl
     let waste = copies.len() as u16;
     let local = |copy: &u32| copies.binary_search(copy).map_or(waste, |l| l as u16);
     let held: Vec<[u16; 4]> = held.iter().map(|held| held.each_ref().map(local)).collect();
-    let mut batches = pack(&held, copies.len());
-    let mut nodes = vec![[[waste; LANES]; 4]; batches.len()];
-    for (ids, batch) in nodes.iter_mut().zip(&mut batches) {
-        for (lane, item) in batch.iter_mut().enumerate().filter(|(_, item)| **item != NO_PIECE) {
-            for (id, local) in ids.iter_mut().zip(held[*item as usize]) {
-                id[lane] = local;
+    let mut plan =
+        ChunkPlan { copies, n_strips: 0, corners: Vec::new(), pieces: Vec::new(), nodes: Vec::new() };
+    let mut single = vec![true; held.len()];
+    plan.add_strips(&held, &mut single);
+    let rest: Vec<u32> = (0..held.len() as u32).filter(|&item| single[item as usize]).collect();
+    let rest_held: Vec<[u16; 4]> = rest.iter().map(|&item| held[item as usize]).collect();
+    for batch in pack(&rest_held, plan.copies.len()) {
+        let mut ids = [[waste; LANES]; 4];
+        let mut pieces = batch;
+        for (lane, item) in pieces.iter_mut().enumerate().filter(|(_, item)| **item != NO_PIECE) {
+            *item = rest[*item as usize];
+            set_lane(&mut ids, lane, &held[*item as usize]);
+        }
+        plan.pieces.push(pieces);
+        plan.nodes.push(ids);
+    }
+    for piece in plan.pieces.as_flattened_mut().iter_mut().filter(|p| **p != NO_PIECE) {
+        *piece = chunk[*piece as usize];
+    }
+    plan
+}
+
+impl ChunkPlan {
+    /// Adds as many full pairs of batches of strips as there are among `held`. Their pieces are `single` no longer.
+    fn add_strips(&mut self, held: &[[u16; 4]], single: &mut [bool]) {
+        let strips = find_strips(held);
+        let nodes: Vec<[u16; STRIP_NODES]> = strips.iter().map(|strip| strip.nodes).collect();
+        let mut full = pack(&nodes, self.copies.len());
+        full.retain(|lanes| !lanes.contains(&NO_PIECE));
+        for pair in full.as_chunks::<2>().0 {
+            for t in 0..STRIP_TETS {
+                for lanes in pair {
+                    let strips = lanes.map(|strip| &strips[strip as usize]);
+                    let tets = strips.map(|strip| strip.tets[t]);
+                    let mut ids = [[0; LANES]; 4];
+                    for (lane, strip) in strips.iter().enumerate() {
+                        set_lane(&mut ids, lane, &strip.nodes[t..t + 4]);
+                    }
+                    tets.iter().for_each(|&tet| single[tet as usize] = false);
+                    self.corners.push(std::array::from_fn(|l| strips[l].corners(t, &held[tets[l] as usize])));
+                    self.pieces.push(tets);
+                    self.nodes.push(ids);
+                }
             }
-            *item = chunk[*item as usize];
+            self.n_strips += 1;
         }
     }
-    ChunkPlan { nodes, pieces: batches, copies }
+}
+
+/// Gives one lane these local numbers.
+fn set_lane(ids: &mut [Ids; 4], lane: usize, numbers: &[u16]) {
+    for (ids, &number) in ids.iter_mut().zip(numbers) {
+        ids[lane] = number;
+    }
 }
 
 /// First-fit packing of `items`, local numbers below `n_locals`, into batches without a common number,
@@ -330,17 +378,20 @@ mod tests {
             .map(|chunk| plan_chunk(&chunk, |p| pieces[p as usize].copies))
             .collect();
         let mut seen = vec![0; pieces.len()];
-        let (mut batches, mut shared) = (0, 0);
+        let (mut batches, mut shared, mut in_strips) = (0, 0, 0);
         for plan in &plans {
             batches += plan.pieces.len();
-            for (lanes, nodes) in plan.pieces.iter().zip(&plan.nodes) {
+            in_strips += plan.corners.len() * LANES;
+            assert_eq!(plan.corners.len(), 6 * plan.n_strips);
+            for (b, (lanes, nodes)) in plan.pieces.iter().zip(&plan.nodes).enumerate() {
                 let mut used: Vec<u32> = Vec::new();
                 for lane in 0..LANES {
                     if lanes[lane] != NO_PIECE {
                         seen[lanes[lane] as usize] += 1;
                         for (a, ids) in nodes.iter().enumerate() {
                             let copy = plan.copies[ids[lane] as usize];
-                            assert_eq!(copy, pieces[lanes[lane] as usize].copies[a]);
+                            let corner = plan.corners.get(b).map_or(a, |lanes| lanes[lane][a] as usize);
+                            assert_eq!(copy, pieces[lanes[lane] as usize].copies[corner]);
                             shared += usize::from(used.contains(&copy));
                             used.push(copy);
                         }
@@ -350,6 +401,7 @@ mod tests {
         }
         assert!(seen.iter().all(|&n| n == 1));
         assert!(batches * LANES < pieces.len() + LANES * plans.len(), "{batches} batches");
+        assert!(in_strips as f64 > 0.9 * pieces.len() as f64, "{in_strips} pieces in strips");
         assert!(shared < pieces.len() / 10, "{shared} copies are shared within batches");
         let gather = Gather::new(plans.iter().map(|p| &p.copies[..]), mesh.nodes.len());
         let mut rows = vec![[0.0_f32; 2]; gather.n_rows()];

@@ -3,8 +3,8 @@
 //! They are computed from the pieces' gradients in the new variables. The blocks of A would cancel: the
 //! stiff parts of A are 1/ε times as large as what remains of them.
 
-use super::kernel::Block6;
 use super::stiffness::{ElasticUpdate, Place, Stiffness};
+use super::tet_batch::Block6;
 use super::{StiffModes, Substitution};
 use crate::team::{Team, blocks};
 

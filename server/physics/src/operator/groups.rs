@@ -4,8 +4,8 @@
 
 use nalgebra::Vector3;
 
-use super::kernel::Coefficients;
 use super::stiffness::ElasticUpdate;
+use super::tet_batch::Coefficients;
 use crate::material::{Lame, Region, Regions};
 
 /// Elements per group: local vectors, gradients and indices of a chunk stay near the core, and a

@@ -15,15 +15,18 @@ mod inverse;
 mod preconditioner;
 mod stiff_modes;
 mod stiffness;
+mod strip_kernel;
+mod strips;
 mod substitution;
 pub mod rows;
 mod system;
+mod tet_batch;
+mod tet_lanes;
 
 pub use composite_diagonal::CompositeDiagonal;
 pub use elastic::Elastic;
 pub use held::Held;
 pub use inverse::{Inverse3, invert, invert_free};
-pub use kernel::Block6;
 pub use precondition::{Iterate, Preconditioner};
 pub use preconditioner::BlockJacobi;
 pub use rows::Sum;
@@ -31,6 +34,7 @@ pub use stiff_modes::{NearPiece, StiffModes, degenerate_elements};
 pub use stiffness::{Direction, ElasticUpdate, OperatorChoice, Place, Stiffness, apply};
 pub use substitution::{Substitutable, Substitution};
 pub use system::{FixedCopy, Spring, SystemOperator, filter, filter_block};
+pub use tet_batch::Block6;
 
 use crate::storage::saved::saved_as;
 use crate::team::{Team, blocks};

@@ -6,7 +6,7 @@ use std::fmt::Debug;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::kernel::Block6;
+use super::tet_batch::Block6;
 use super::{BLOCK, Padded, block_of, rows};
 use crate::material::{Lame, Law};
 use crate::team::{Team, blocks};

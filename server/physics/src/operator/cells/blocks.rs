@@ -4,7 +4,7 @@
 
 use nalgebra::Matrix3;
 
-use super::super::kernel::Block6;
+use super::super::tet_batch::Block6;
 use super::batch::SectorBatch;
 use super::sectors::{ENTRY, Matrix24, SectorTable, diagonal_blocks};
 use super::stored::{Entry, StoredBatch, stored_entry};

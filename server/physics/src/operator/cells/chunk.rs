@@ -10,7 +10,7 @@ use nalgebra::Matrix3;
 
 use super::super::Padded;
 use super::super::chunks::{NO_PIECE, pack};
-use super::super::kernel::Block6;
+use super::super::tet_batch::Block6;
 use super::batch::{self, HangingWeights, SectorBatch, TableLanes};
 use super::blocks::{self, BlockTable};
 use super::lane::{CellLane, CellMatrix, HANGING_SLOTS, frame, turned};

@@ -6,9 +6,9 @@ use std::ops::Range;
 use nalgebra::Matrix3;
 
 use super::super::chunks::Gather;
-use super::super::kernel::Block6;
 use super::super::rows::{self, Sum, gather_direction};
 use super::super::stiffness::{Direction, Place};
+use super::super::tet_batch::Block6;
 use super::super::{BLOCK, LinearOperator, Padded, block_of};
 use super::batch::TableLanes;
 use super::blocks::BlockTable;

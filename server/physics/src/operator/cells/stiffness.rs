@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::kernel::Block6;
 use super::super::stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
+use super::super::tet_batch::Block6;
 use super::super::{LinearOperator, OperatorChoice, Padded};
 use super::chunk::CellChunk;
 use super::lane::{CellLane, CellMatrix};

@@ -7,7 +7,7 @@ use super::*;
 use crate::element::{Simd, polar_rotation};
 use crate::material::{Lame, Law};
 use crate::octree::{BoxShape, CutLink, LinkKey, OUTSIDE, Octree, OctreeSettings, Shape, corner_weights};
-use crate::operator::kernel::Block6;
+use crate::operator::tet_batch::Block6;
 use crate::operator::{BLOCK, ElasticUpdate, LinearOperator, Padded, Stiffness};
 use crate::team::{Team, blocks};
 
