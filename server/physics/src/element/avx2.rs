@@ -188,7 +188,7 @@ impl Vector8 for Register {
 }
 
 #[inline(always)]
-unsafe fn row(x: &[[f32; 4]], id: u16) -> __m128 {
+pub(super) unsafe fn row(x: &[[f32; 4]], id: u16) -> __m128 {
     // SAFETY: the caller keeps `id` below the length; a row holds four numbers.
     unsafe { _mm_loadu_ps(x.as_ptr().add(id as usize).cast()) }
 }
@@ -204,7 +204,7 @@ unsafe fn edge(x: &[[f64; 4]], from: u16, to: u16) -> __m128 {
 }
 
 #[inline(always)]
-unsafe fn add_row(y: &mut [[f32; 4]], id: u16, part: __m128) {
+pub(super) unsafe fn add_row(y: &mut [[f32; 4]], id: u16, part: __m128) {
     // SAFETY: the caller keeps `id` below the length; a row holds four numbers.
     unsafe {
         let row = y.as_mut_ptr().add(id as usize).cast();

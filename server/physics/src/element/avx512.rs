@@ -10,14 +10,16 @@
 
 use std::arch::x86_64::{
     __m512, _CMP_GT_OQ, _mm256_castpd_ps, _mm256_castps_pd, _mm256_loadu_ps, _mm512_add_ps,
-    _mm512_broadcast_f64x4, _mm512_castpd_ps, _mm512_castps_pd, _mm512_castps_si512, _mm512_castps256_ps512,
-    _mm512_castps512_ps256, _mm512_castsi512_ps, _mm512_cmp_ps_mask, _mm512_div_ps, _mm512_extractf64x4_pd,
-    _mm512_fmadd_ps, _mm512_insertf64x4, _mm512_mask_blend_ps, _mm512_mul_ps, _mm512_set1_ps, _mm512_sqrt_ps,
-    _mm512_sub_ps, _mm512_xor_si512,
+    _mm512_broadcast_f64x4, _mm512_castpd_ps, _mm512_castps_pd, _mm512_castps_si512, _mm512_castps128_ps512,
+    _mm512_castps256_ps512, _mm512_castps512_ps128, _mm512_castps512_ps256, _mm512_castsi512_ps,
+    _mm512_cmp_ps_mask, _mm512_div_ps, _mm512_extractf32x4_ps, _mm512_extractf64x4_pd, _mm512_fmadd_ps,
+    _mm512_insertf32x4, _mm512_insertf64x4, _mm512_mask_blend_ps, _mm512_mul_ps, _mm512_set1_ps,
+    _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_sqrt_ps, _mm512_sub_ps, _mm512_unpackhi_ps,
+    _mm512_unpacklo_ps, _mm512_xor_si512,
 };
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::avx2::Register;
+use super::avx2::{Register, add_row, row};
 use super::lanes::{Batched, Ids, Lanes, Vector, Vector8};
 
 /// The lanes of two batches, for use only inside functions that enable AVX-512, AVX2 and FMA.
@@ -130,10 +132,49 @@ impl Batched<2> for Register512 {
 
     #[inline(always)]
     unsafe fn gather_all<B>(x: &[[f32; 4]], from: &[B; 2], ids: impl Fn(&B) -> &Ids) -> [Self; 3] {
-        // SAFETY: the caller's promise.
-        let ([a, b, c], [d, e, f]) =
-            unsafe { (Register::gather(x, ids(&from[0])), Register::gather(x, ids(&from[1]))) };
-        [pair(a, d), pair(b, e), pair(c, f)]
+        let (first, second) = (ids(&from[0]), ids(&from[1]));
+        // SAFETY: the caller keeps the numbers below the length; rows hold four numbers each.
+        let [x, y, z, _] = unsafe {
+            quarters([
+                rows_512(x, [first[0], first[4], second[0], second[4]]),
+                rows_512(x, [first[1], first[5], second[1], second[5]]),
+                rows_512(x, [first[2], first[6], second[2], second[6]]),
+                rows_512(x, [first[3], first[7], second[3], second[7]]),
+            ])
+        };
+        [Self(x), Self(y), Self(z)]
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_all<'a, const M: usize>(
+        y: &mut [[f32; 4]],
+        ids: impl Fn(usize) -> [&'a Ids; M],
+        f: &[[Self; 3]; M],
+    ) {
+        let (first, second) = (ids(0), ids(1));
+        // SAFETY: the caller keeps the numbers below the length; rows hold four numbers each.
+        unsafe {
+            let mut rows = [[_mm512_setzero_ps(); 4]; M];
+            for m in 0..M {
+                rows[m] = quarters([f[m][0].0, f[m][1].0, f[m][2].0, _mm512_setzero_ps()]);
+            }
+            for m in 0..M {
+                for k in 0..4 {
+                    add_row(y, first[m][k], _mm512_castps512_ps128(rows[m][k]));
+                }
+                for k in 0..4 {
+                    add_row(y, first[m][k + 4], _mm512_extractf32x4_ps::<1>(rows[m][k]));
+                }
+            }
+            for m in 0..M {
+                for k in 0..4 {
+                    add_row(y, second[m][k], _mm512_extractf32x4_ps::<2>(rows[m][k]));
+                }
+                for k in 0..4 {
+                    add_row(y, second[m][k + 4], _mm512_extractf32x4_ps::<3>(rows[m][k]));
+                }
+            }
+        }
     }
 
     #[inline(always)]
@@ -143,6 +184,34 @@ impl Batched<2> for Register512 {
         let ([a, b, c], [d, e, f]) =
             unsafe { (Register::gather_edges(x, first, second), Register::gather_edges(x, third, fourth)) };
         [pair(a, d), pair(b, e), pair(c, f)]
+    }
+}
+
+/// Four rows of four numbers, one after the other.
+#[inline(always)]
+unsafe fn rows_512(x: &[[f32; 4]], ids: [u16; 4]) -> __m512 {
+    // SAFETY: the caller keeps `ids` below the length; only reached from functions that enable AVX-512.
+    unsafe {
+        let rows = _mm512_castps128_ps512(row(x, ids[0]));
+        let rows = _mm512_insertf32x4::<1>(rows, row(x, ids[1]));
+        let rows = _mm512_insertf32x4::<2>(rows, row(x, ids[2]));
+        _mm512_insertf32x4::<3>(rows, row(x, ids[3]))
+    }
+}
+
+/// Transposes each quarter of four rows: of row k, entries k, k + 4, k + 8 and k + 12 of all four.
+#[inline(always)]
+unsafe fn quarters([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
+    // SAFETY: only reached from functions that enable AVX-512.
+    unsafe {
+        let (low_ab, high_ab) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+        let (low_cd, high_cd) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+        [
+            _mm512_shuffle_ps::<0x44>(low_ab, low_cd),
+            _mm512_shuffle_ps::<0xEE>(low_ab, low_cd),
+            _mm512_shuffle_ps::<0x44>(high_ab, high_cd),
+            _mm512_shuffle_ps::<0xEE>(high_ab, high_cd),
+        ]
     }
 }
 
