@@ -33,7 +33,8 @@ pub struct MultigridSettings {
     /// gives exact Galerkin operators.
     pub same_rotation_rad: f64,
     /// Whether matrices of coarse cells are rounded to half precision where smoothing multiplies with them: cycles
-    /// wait for memory less. Coarser matrices are made of those in single precision.
+    /// wait for memory less. Coarser matrices are made of those in single precision. Without effect on cycles with
+    /// several visits, where residuals of smooth solutions of a coarse level count: they are smaller than the rounding.
     pub half_precision: bool,
     /// How often a cycle works on every coarse level before it goes back to the finer one: once in a V-cycle, twice in a
     /// W-cycle. The coarsest level is solved each time.
@@ -161,7 +162,7 @@ impl Multigrid {
             let if_needed = |needed: bool| if needed { vec![[0.0; 4]; n] } else { Vec::new() };
             let (zeros, inner) = (|| if_needed(l >= first), || if_needed(l > 0 && l != first));
             // On the level that is solved on a kernel is the operator of the equations.
-            let half = settings.half_precision && l > first;
+            let half = settings.half_precision && settings.visits < 2 && l > first;
             let kernel = (l > 0 && l >= first).then(|| LevelKernel::new(settings.simd, half));
             Vectors {
                 inverse: if l > first { vec![Inverse3::default(); n] } else { Vec::new() },

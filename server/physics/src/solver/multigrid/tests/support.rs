@@ -2,8 +2,9 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
+use crate::cut::BladeSweep;
 use crate::material::Lame;
-use crate::octree::{BoxShape, CutLink, LinkKey, Octree, OctreeSettings, corner_weights};
+use crate::octree::{BoxShape, CutLink, LinkKey, Octree, OctreeSettings, OctreeSpace, corner_weights};
 use crate::operator::cells::unit_stiffness;
 use crate::operator::{
     BlockJacobi, FixedCopy, Inverse3, LinearOperator, Padded, Preconditioner, Spring, filter, invert, padded,
@@ -11,6 +12,7 @@ use crate::operator::{
 use crate::solver::multigrid::galerkin::Galerkin;
 use crate::solver::multigrid::operator::CellProducts;
 use crate::solver::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
+use crate::space::Space;
 use crate::team::Team;
 
 pub type V3 = Vector3<f64>;
@@ -50,6 +52,28 @@ pub fn blade_grid(octree: &mut Octree, planes: &[i32]) {
         }
     }
     octree.cut(&cuts);
+}
+
+/// Cuts by `n` planes in either direction, turned by 30° about z, from the top down to half the height.
+pub fn turned_blades(octree: Octree, n: u32) -> Octree {
+    let mut at = octree.rest_positions();
+    let (low, high) = at.iter().fold((at[0], at[0]), |(low, high), x| (low.inf(x), high.sup(x)));
+    let (centre, side) = (0.5 * (low + high), high.x - low.x);
+    let turn = Rotation3::from_axis_angle(&V3::z_axis(), 30_f64.to_radians());
+    let mut space = OctreeSpace::new(octree);
+    for (incision, (axis, i)) in (1..).zip([0, 1].into_iter().flat_map(|axis| (0..n).map(move |i| (axis, i))))
+    {
+        let across = side * 1.1 * ((f64::from(i) + 0.5) / f64::from(n) - 0.5);
+        let point = |along: f64, z: f64| {
+            let flat = if axis == 0 { V3::new(across, along, z) } else { V3::new(along, across, z) };
+            centre + turn * flat
+        };
+        let segment = |z: f64| [point(-side, z), point(side, z)];
+        let blade = BladeSweep { segments: vec![segment(0.6 * side), segment(0.0)] };
+        let report = space.cut(&mut Team::alone(), &at, &blade, incision).unwrap();
+        report.new_copies.iter().for_each(|new| at.push(new.inherited(&at)));
+    }
+    space.octree().clone()
 }
 
 /// The vertices with lattice coordinate 0 along `axis`, held in all directions.
