@@ -2,8 +2,8 @@
 //!
 //! K̂ is symmetric and its rows sum to zero (a translation causes no strain), so the blocks above the
 //! diagonal suffice: (K̂ u)_a = Σ_b K_ab (u_b − u_a). That is half the memory of block CSR, 40 bytes per
-//! pair, and about twice as fast as the tets themselves. But it has to be assembled, which only pays
-//! where the stiffness stays the same, as with the linear law, or is applied often.
+//! pair. In the caches it is a fifth faster than the tets themselves with AVX2, and hardly faster with AVX-512. But it
+//! has to be assembled, which only pays where the stiffness stays the same, as with the linear law, or is applied often.
 
 #![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
 
