@@ -54,6 +54,7 @@ use crate::material::{Material, Rayleigh, Regions};
 use crate::mesh::{HexMesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
+pub use crate::solver::multigrid::CycleShape;
 pub use crate::solver::{Method, PcgSettings, StopReason};
 use crate::space::skin::{Skin, SkinSettings, SkinShape};
 use crate::space::{Space, Tets};

@@ -8,6 +8,7 @@ use crate::element::Simd;
 use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
 use crate::material::{Fibres, Law, Prony};
 use crate::operator::OperatorChoice;
+use crate::solver::multigrid::CycleShape;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
 /// Settings that are chosen when a body is made.
@@ -57,6 +58,8 @@ pub struct BodySettings {
     /// cells wide move the vertices of the finest cells; cuts, surface and materials stay as fine as these. Needs
     /// a method of multigrid on the fast path.
     pub simulate_level: u8,
+    /// Shape of the cycles of a method of multigrid.
+    pub cycle: CycleShape,
     /// Solve [`Scheme::Static`] by matrix-free relaxation: `solver.iterations` of it per step, continued
     /// from step to step. `method` is then unused.
     pub relaxation: bool,
@@ -121,6 +124,7 @@ impl Default for BodySettings {
             mass: MassKind::Lumped,
             method: Method::Pcg,
             simulate_level: 0,
+            cycle: CycleShape::V,
             relaxation: false,
             operator: OperatorChoice::Auto,
             arithmetic: None,
@@ -265,11 +269,11 @@ impl BodySettings {
             OperatorChoice::Auto => cost::cheapest(law, pieces, (self.solver, self.method)),
             asked => asked,
         }
+        let assembled = self.operator(law, pieces) == OperatorChoice::Assembled;
     }
 
     /// Predicted time [s] of a step of the fast path on one thread.
     pub fn fast_seconds(&self, law: Law, pieces: usize) -> f64 {
-        let assembled = self.operator(law, pieces) == OperatorChoice::Assembled;
         let solves = match self.scheme {
             Scheme::Static if self.descends(law) => DESCENT_SOLVES,
             Scheme::Static => 1.0,
@@ -291,6 +295,7 @@ impl BodySettings {
             linear: (self.solves(law), PcgSettings { iterations, ..self.solver }),
             method: self.method,
             simulate_level: self.simulate_level,
+            cycle: self.cycle,
             relaxation: self.relaxation.then_some(self.solver.iterations),
         }
     }
@@ -345,6 +350,9 @@ impl BodySettings {
             && matches!(self.element, ElementKind::Octree | ElementKind::Hex8)
         {
             return refused("the two-level preconditioner", self.element.name(), "mg-pcg");
+        }
+        if self.cycle != CycleShape::V && !self.method.is_multigrid() {
+            return refused("a W-cycle", "a solver without levels", "mg-pcg or multigrid");
         }
         self.check_level(law)?;
         if !self.prony.is_empty() {

@@ -34,7 +34,7 @@ use crate::operator::{
     StiffModes, Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, invert_free,
     padded, unpadded,
 };
-use crate::solver::multigrid::{CoarsestSolve, Hierarchy, LevelReport, Multigrid};
+use crate::solver::multigrid::{CoarsestSolve, CycleShape, Hierarchy, LevelReport, Multigrid};
 use crate::solver::two_level::CoarseSpace;
 use crate::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
 use crate::storage::reserve::resize_reserving;
@@ -183,13 +183,13 @@ impl LinearStep {
     }
 
     /// Sets the levels of the present topology, and which of them is simulated, or the coarsest one if there are
-    /// fewer.
-    pub fn set_hierarchy(&mut self, hierarchy: Option<Hierarchy>, simulate: usize) {
+    /// fewer. Cycles have this `shape`.
+    pub fn set_hierarchy(&mut self, hierarchy: Option<Hierarchy>, simulate: usize, shape: CycleShape) {
         (self.grid, self.simulated) = (None, None);
         let Some(hierarchy) = hierarchy else { return };
         match simulate.min(hierarchy.n_levels() - 1) {
-            0 => self.grid = Some(Box::new(StepGrid::new(hierarchy))),
-            level => self.simulated = Some(Box::new(SimulatedLevel::new(hierarchy, level))),
+            0 => self.grid = Some(Box::new(StepGrid::new(hierarchy, shape))),
+            level => self.simulated = Some(Box::new(SimulatedLevel::new(hierarchy, level, shape))),
         }
     }
 

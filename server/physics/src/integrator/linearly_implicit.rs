@@ -17,7 +17,7 @@ use crate::element::{Points, Simd};
 use crate::material::Material;
 use crate::octree::OctreeSpace;
 use crate::operator::{ElasticUpdate, Stiffness};
-use crate::solver::multigrid::{CoarsestSolve, LevelReport};
+use crate::solver::multigrid::{CoarsestSolve, CycleShape, LevelReport};
 use crate::solver::{Method, PcgSettings};
 use crate::space::Space;
 use crate::storage::reserve::refill;
@@ -51,6 +51,7 @@ pub struct LinearlyImplicit {
     pcg: PcgSettings,
     method: Method,
     simulate_level: usize,
+    cycle: CycleShape,
     relaxes: bool,
     #[serde(with = "crate::operator::saved_stiffness")]
     stiffness: Box<dyn Stiffness>,
@@ -88,6 +89,7 @@ impl LinearlyImplicit {
             pcg,
             method: settings.method,
             simulate_level: usize::from(settings.simulate_level),
+            cycle: settings.cycle,
             relaxes: settings.relaxation.is_some(),
             stiffness,
             simd,
@@ -148,7 +150,7 @@ impl LinearlyImplicit {
             return;
         }
         let hierarchy = if self.method.is_multigrid() { space.hierarchy(self.simulate_level) } else { None };
-        self.step.set_hierarchy(hierarchy, self.simulate_level);
+        self.step.set_hierarchy(hierarchy, self.simulate_level, self.cycle);
     }
 
     /// Kinetic and elastic energy of the free parts, and Σ f·x of gravity and loads on them [J].

@@ -18,7 +18,7 @@ use crate::operator::{
     BLOCK, FixedCopy, LinearOperator, Padded, Preconditioner, Spring, Stiffness, block_of, filter, padded,
     rows, unpadded,
 };
-use crate::solver::multigrid::{Coefficients, Composite, Hierarchy, Multigrid, MultigridSettings};
+use crate::solver::multigrid::{Coefficients, Composite, CycleShape, Hierarchy, Multigrid};
 use crate::solver::{LinearReport, Method, Pcg, PcgSettings, StopReason};
 use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks};
@@ -53,9 +53,9 @@ pub struct SimulatedLevel {
 
 impl SimulatedLevel {
     /// Level `level` of `hierarchy`.
-    pub fn new(hierarchy: Hierarchy, level: usize) -> Self {
+    pub fn new(hierarchy: Hierarchy, level: usize, shape: CycleShape) -> Self {
         let n_fine = hierarchy.n_vertices();
-        let composite = Composite::new(hierarchy, MultigridSettings::default(), level);
+        let composite = Composite::new(hierarchy, shape.into(), level);
         let n = composite.n_vertices();
         let mut pcg = Pcg::default();
         pcg.resize(n);

@@ -4,7 +4,7 @@ use super::step_inputs::LinearInputs;
 use crate::material::Material;
 use crate::octree::Octree;
 use crate::operator::{Block6, Inverse3, LinearOperator, Spring, Stiffness, invert};
-use crate::solver::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
+use crate::solver::multigrid::{CellMaterial, Coefficients, Cycle, CycleShape, Hierarchy, Multigrid};
 use crate::team::Team;
 
 /// If a spring is stiffer than this times the body at its point, all levels take the springs: corrections by levels
@@ -28,10 +28,10 @@ pub struct StepGrid {
 
 impl StepGrid {
     /// Multigrid for the cells of `hierarchy`.
-    pub fn new(hierarchy: Hierarchy) -> Self {
+    pub fn new(hierarchy: Hierarchy, shape: CycleShape) -> Self {
         let none = Coefficients { materials: Vec::new(), scale: 0.0, mass_factor: 0.0 };
         Self {
-            multigrid: Multigrid::new(hierarchy, MultigridSettings::default()),
+            multigrid: Multigrid::new(hierarchy, shape.into()),
             coefficients: none,
             version: None,
             largest: 0.0,

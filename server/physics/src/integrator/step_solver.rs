@@ -16,7 +16,7 @@ use crate::assembly::{Model, ModelError};
 use crate::element::Points;
 use crate::material::Material;
 use crate::operator::{FixedCopy, Stiffness};
-use crate::solver::multigrid::{CoarsestSolve, LevelReport};
+use crate::solver::multigrid::{CoarsestSolve, CycleShape, LevelReport};
 use crate::solver::{Method, NewtonSettings, PcgSettings};
 use crate::space::Space;
 use crate::team::Team;
@@ -160,6 +160,8 @@ pub struct SolverSettings {
     pub method: Method,
     /// Level of multigrid that is simulated; 0 is the finest one.
     pub simulate_level: u8,
+    /// Shape of the cycles of multigrid.
+    pub cycle: CycleShape,
     /// [`Scheme::Static`] only: number of iterations of matrix-free relaxation per step, in place of Newton's
     /// method. They continue from step to step.
     pub relaxation: Option<u32>,

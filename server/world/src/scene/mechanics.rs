@@ -1,15 +1,15 @@
 //! How a body is computed: the words of a scene, and the settings of a body that they stand for.
 
 use scindo_physics::body::{
-    Arithmetic, BodySettings, CuttingMethod, ElementKind, FrontRule, LooseRule, MassKind, Method,
+    Arithmetic, BodySettings, CuttingMethod, CycleShape, ElementKind, FrontRule, LooseRule, MassKind, Method,
     OperatorChoice, PcgSettings, Scheme, Volumetric,
 };
 use scindo_physics::cut::remesh::{Moves, SnapSettings};
 use scindo_physics::material::{Fibres, Law, Prony};
 
 use super::raw::{
-    RawCutMethod, RawElement, RawFront, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod,
-    RawMoves, RawOperator, RawPrecision,
+    RawCutMethod, RawCycle, RawElement, RawFront, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass,
+    RawMethod, RawMoves, RawOperator, RawPrecision,
 };
 
 /// Share of the volumetric energy that node averaging leaves with the elements, against checkerboards.
@@ -58,6 +58,8 @@ pub struct Mechanics {
     pub newton_steps: Option<u32>,
     /// How single precision applies the stiffness; `None`: what costs less.
     pub operator: Option<RawOperator>,
+    /// Shape of the cycles of multigrid.
+    pub cycle: RawCycle,
     /// Most iterations of a linear solve; none: as the mesh calls for.
     pub iterations: Option<u32>,
     /// Whether so many iterations are meant, whatever residual they leave.
@@ -177,6 +179,10 @@ impl Mechanics {
                 RawMethod::TwoLevelPcg => Method::TwoLevelPcg,
                 RawMethod::Multigrid => Method::Multigrid,
                 RawMethod::MgPcg => Method::MgPcg,
+            },
+            cycle: match self.cycle {
+                RawCycle::V => CycleShape::V,
+                RawCycle::W => CycleShape::W,
             },
             relaxation: self.method == RawMethod::Relaxation,
             arithmetic: self.precision.map(|precision| match precision {

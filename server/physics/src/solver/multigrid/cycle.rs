@@ -43,6 +43,26 @@ pub struct MultigridSettings {
     pub simd: Simd,
 }
 
+/// The order in which a cycle goes through the levels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum CycleShape {
+    /// Down to the coarsest level and up again.
+    #[default]
+    V,
+    /// From every level twice down to the next one.
+    W,
+}
+
+impl From<CycleShape> for MultigridSettings {
+    fn from(shape: CycleShape) -> Self {
+        let visits = match shape {
+            CycleShape::V => 1,
+            CycleShape::W => 2,
+        };
+        Self { visits, ..Self::default() }
+    }
+}
+
 impl Default for MultigridSettings {
     fn default() -> Self {
         Self {

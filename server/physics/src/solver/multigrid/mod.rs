@@ -34,7 +34,7 @@ mod restricted;
 mod simulated;
 
 pub use coarsest::CoarsestSolve;
-pub use cycle::{LevelReport, Multigrid, MultigridSettings};
+pub use cycle::{CycleShape, LevelReport, Multigrid, MultigridSettings};
 pub use follow::LevelChange;
 pub use galerkin::{CellMaterial, Coefficients};
 pub use hierarchy::Hierarchy;

@@ -29,6 +29,7 @@ impl Check<'_> {
             method_is_default: body.solver.method.is_none(),
             precision: body.solver.precision,
             operator: body.solver.operator,
+            cycle: body.solver.cycle,
             newton_steps: body.solver.newton_steps,
             iterations: body.solver.iterations,
             fixed_iterations: body.solver.fixed_iterations,
@@ -231,6 +232,14 @@ impl Check<'_> {
                 let what = format!("found `{found}` with {why}");
                 return self.conflict(key, what, "change that, or choose cg, pcg or cholesky");
             }
+        }
+        if m.cycle != RawCycle::V && !matches!(m.method, RawMethod::Multigrid | RawMethod::MgPcg) {
+            let what = format!(
+                "found `{}` with solver.method = `{found}`, allowed: multigrid, mg-pcg",
+                word(&m.cycle)
+            );
+            let next = "remove it, or write element = \"octree\" and solver.method = \"mg-pcg\"";
+            return self.conflict(format!("{at}.solver.cycle"), what, next);
         }
         if m.method == RawMethod::TwoLevelPcg {
             if m.element != RawElement::Tet4 {

@@ -4,7 +4,7 @@ use scindo_physics::body::{Arithmetic, OperatorChoice};
 
 use super::{Plan, count};
 use crate::body::BodySize;
-use crate::scene::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod};
+use crate::scene::raw::{RawCycle, RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod};
 use crate::scene::{BodySpec, CheckedScene, Mechanics};
 
 /// General path, seconds per quadrature point for energy and forces.
@@ -96,6 +96,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         Arithmetic::Mixed => "mixed",
         Arithmetic::Double => "double",
     };
+    let cycles = if m.cycle == RawCycle::W { "W-cycles" } else { "cycles" };
     let solver = match m.method {
         _ if m.integrator.is_explicit() => "no solver".into(),
         RawMethod::Cholesky => format!("cholesky, {precision}"),
@@ -106,10 +107,11 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
             format!("cg, at most {} iterations to {:e}, {precision}", size.iterations, m.tolerance)
         }
         RawMethod::Multigrid => {
-            format!("multigrid, at most {} cycles to {:e}, {precision}", size.iterations, m.tolerance)
+            format!("multigrid, at most {} {cycles} to {:e}, {precision}", size.iterations, m.tolerance)
         }
         RawMethod::MgPcg => format!(
-            "cg preconditioned by multigrid{}, at most {} iterations to {:e}, {precision}",
+            "cg preconditioned by {}{}, at most {} iterations to {:e}, {precision}",
+            if m.cycle == RawCycle::W { "W-cycles of multigrid" } else { "multigrid" },
             if m.method_is_default { " by default" } else { "" },
             size.iterations,
             m.tolerance
