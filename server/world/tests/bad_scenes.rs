@@ -258,6 +258,12 @@ solver = { precision = "single" }"#,
             r#"solver = { method = "cg", operator = "assembled" }"#,
             &["solver.operator", "general path", "remove it"],
         ),
+        (
+            r#"element = "octree"
+solver = { operator = "assembled" }"#,
+            &["solver.operator", "`assembled` with octree", "matrix-free"],
+        ),
+        (r#"solver = { cycle = "w" }"#, &["solver.cycle", "`w` with solver.method = `pcg`", "mg-pcg"]),
     ];
     for (lines, parts) in cases {
         assert_says(&uncut_with(lines).unwrap_err().to_string(), parts);

@@ -1,4 +1,4 @@
-//! Costs of the two ways to apply the stiffness, and the choice between them.
+//! Costs of a step, and the choice between the two ways to apply the stiffness of tetrahedra.
 //!
 //! The costs are constants from the bench `bar` on one core, not measured at run time. The two ways
 //! differ in the last bits, so a choice by the clock would make the bits of a run depend on the load of
@@ -7,6 +7,7 @@
 
 use crate::material::Law;
 use crate::operator::OperatorChoice;
+use crate::solver::multigrid::CycleShape;
 use crate::solver::{Method, PcgSettings};
 
 /// Up to this many pieces the stiffness stays in the caches from one application to the next.
@@ -33,6 +34,28 @@ const ITERATIONS_PER_DECADE: f64 = 12.0;
 /// The same with a two-level preconditioner, and seconds per piece and iteration for its coarse space.
 const TWO_LEVEL_ITERATIONS_PER_DECADE: f64 = 5.5;
 const COARSE_SPACE: f64 = 5e-9;
+
+/// Seconds per cell and step for rotations and forces of octree cells, and with multigrid for the operators of all
+/// levels.
+const CELL_STEP: [f64; 2] = [0.3e-6, 0.9e-6];
+
+/// Seconds per cell and iteration: a product with its vectors, and with a V- or W-cycle beside it.
+const CELL_ITERATION: f64 = 50e-9;
+const CELL_CYCLE: [f64; 2] = [0.4e-6, 0.7e-6];
+
+/// Iterations with a cycle that take the residual down to a tenth, in a body that is not cut much.
+const CYCLES_PER_DECADE: f64 = 1.5;
+
+/// Estimated time [s] of a step of a body of `cells` octree cells on one thread. Cuts that are yet to come add cells, and
+/// iterations.
+pub fn cell_step_seconds(cells: usize, solver: PcgSettings, cycle: Option<CycleShape>) -> f64 {
+    let with_cycle = |shape| CELL_CYCLE[usize::from(shape == CycleShape::W)];
+    let (step, per_decade, iteration) = match cycle {
+        Some(shape) => (CELL_STEP[1], CYCLES_PER_DECADE, with_cycle(shape)),
+        None => (CELL_STEP[0], ITERATIONS_PER_DECADE, CELL_ITERATION),
+    };
+    cells as f64 * (step + expected_iterations(solver, per_decade) * iteration)
+}
 
 /// Estimated time [s] of a step of a body of `pieces` pieces on one thread.
 pub fn step_seconds(
@@ -82,6 +105,20 @@ mod tests {
         // Where both wait for memory, blocks are the larger part of it.
         assert_eq!(of(Law::Corotational, 500_000, 1000), OperatorChoice::MatrixFree);
         assert_eq!(of(Law::Linear, 500_000, 1000), OperatorChoice::MatrixFree);
+    }
+
+    /// Times of scenes on one core of a server: three-cuts and rods after their cuts.
+    #[test]
+    fn steps_of_cells_cost_what_they_took() {
+        let of = |cells, tolerance, cycle| {
+            cell_step_seconds(cells, PcgSettings { iterations: 30, tolerance }, cycle)
+        };
+        let organ = of(17_459, 1e-3, Some(CycleShape::V));
+        assert!((organ / 51.9e-3 - 1.0).abs() < 0.3, "{organ}");
+        // Rods take as many cycles as a smaller tolerance would elsewhere.
+        let rods = of(39_836, 1e-5, Some(CycleShape::V));
+        assert!((rods / 156e-3 - 1.0).abs() < 0.3, "{rods}");
+        assert!(of(39_836, 1e-5, Some(CycleShape::W)) > rods && of(39_836, 1e-5, None) > 0.0);
     }
 
     #[test]

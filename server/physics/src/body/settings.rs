@@ -263,13 +263,18 @@ impl BodySettings {
         NewtonSettings { steps, halvings, tolerance: self.solver.tolerance, curvature, linear }
     }
 
+    /// Whether the elements are cubical cells, whose stiffness is applied without a matrix.
+    pub fn has_cells(&self) -> bool {
+        self.element == ElementKind::Octree || (self.element == ElementKind::Hex8 && self.cubes)
+    }
+
     /// How the fast path applies the stiffness of `pieces` pieces; never [`OperatorChoice::Auto`].
     pub fn operator(&self, law: Law, pieces: usize) -> OperatorChoice {
         match self.operator {
+            _ if self.has_cells() => OperatorChoice::MatrixFree,
             OperatorChoice::Auto => cost::cheapest(law, pieces, (self.solver, self.method)),
             asked => asked,
         }
-        let assembled = self.operator(law, pieces) == OperatorChoice::Assembled;
     }
 
     /// Predicted time [s] of a step of the fast path on one thread.
@@ -279,7 +284,14 @@ impl BodySettings {
             Scheme::Static => 1.0,
             _ => f64::from(self.solves(law)),
         };
-        solves * cost::step_seconds(law, pieces, (self.solver, self.method), assembled)
+        let solve = if self.has_cells() {
+            let cycle = self.method.is_multigrid().then_some(self.cycle);
+            cost::cell_step_seconds(pieces, self.solver, cycle)
+        } else {
+            let assembled = self.operator(law, pieces) == OperatorChoice::Assembled;
+            cost::step_seconds(law, pieces, (self.solver, self.method), assembled)
+        };
+        solves * solve
     }
 
     /// When the solvers of a step stop. An equilibrium by linear solves may use all the iterations that

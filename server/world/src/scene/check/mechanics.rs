@@ -301,7 +301,18 @@ impl Check<'_> {
     }
 
     fn operator(&mut self, at: &str, m: &Mechanics) {
-        let Some(found) = m.operator.filter(|_| m.arithmetic() != Arithmetic::Single) else { return };
+        let Some(found) = m.operator else { return };
+        if m.body_settings().has_cells() && found == RawOperator::Assembled {
+            let what = format!("found `{}` with {}, allowed: matrix-free", word(&found), word(&m.element));
+            return self.conflict(
+                format!("{at}.solver.operator"),
+                what,
+                "remove it; cells share their matrix",
+            );
+        }
+        if m.arithmetic() == Arithmetic::Single {
+            return;
+        }
         let why = m.why_general().unwrap_or("the chosen precision");
         let what = format!("found `{}`, but the general path is taken, for {why}", word(&found));
         self.conflict(

@@ -129,8 +129,11 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
             OperatorChoice::Assembled => "assembled",
             _ => "matrix-free",
         };
-        let why = if m.operator.is_some() { "set by the scene" } else { "it costs less" };
-        format!("fast path, {operator}: {why}")
+        match m.operator {
+            _ if m.body_settings().has_cells() => format!("fast path, {operator}"),
+            Some(_) => format!("fast path, {operator}: set by the scene"),
+            None => format!("fast path, {operator}: it costs less"),
+        }
     } else if m.integrator.is_explicit() || m.method == RawMethod::Relaxation {
         "general path, forces only".into()
     } else {
