@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
 use scindo_physics::body::{
-    Body, BodySettings, Method, Outcome, PcgSettings, PointSpring, Scheme, SolveReport, SpringKind,
+    Body, BodySettings, CycleShape, Method, Outcome, PcgSettings, PointSpring, Scheme, SolveReport,
+    SpringKind,
 };
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::MaterialPoint;
@@ -82,6 +83,30 @@ fn equilibria_take_few_iterations_at_any_size() {
         iterations.push(mg_pcg.1);
     }
     assert!(iterations[1] <= iterations[0] + 6);
+}
+
+/// The levels follow every cut, and are worked on twice.
+#[test]
+fn w_cycles_find_the_same_equilibria_in_fewer_iterations() {
+    let solve = |cycle| {
+        let settings = BodySettings { cycle, ..with(Method::MgPcg, Scheme::Static, 1e-5) };
+        let mut body = cube(24, 2, Law::Linear, settings);
+        let mut iterations = 0;
+        for (incision, x) in (1..).zip([0.3, 0.45, 0.6, 0.75]) {
+            body.cut(&slit(x), incision).unwrap();
+            iterations += advance(&mut body, 1.0, &[]).iterations;
+        }
+        (moved(&body), iterations)
+    };
+    let [v, w] = [CycleShape::V, CycleShape::W].map(solve);
+    println!("{} iterations with V-cycles, {} with W-cycles", v.1, w.1);
+    assert!(difference(&w.0, &v.0) < 1e-3 && w.1 < v.1);
+
+    let settings = BodySettings { cycle: CycleShape::W, ..with(Method::Pcg, Scheme::Static, 1e-5) };
+    let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
+    let octree = Octree::fill(&shape, OctreeSettings { cells: 4, levels: 0 }, &|_| 0).unwrap();
+    let refused = Body::of_space(Box::new(OctreeSpace::new(octree)), MATERIAL, settings).unwrap_err();
+    assert!(refused.to_string().contains("W-cycle"), "{refused}");
 }
 
 /// Positions after eight steps with a cut after four, and with springs of `stiffness` [N/m] from the third on: one
