@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use scindo_allocations::{Counting, allocations};
 use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::body::{Body, BodySettings, PointSpring, SpringKind};
+use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::{MaterialPoint, Simd};
 use scindo_physics::material::{Law, Material, Rayleigh, Tangent};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
@@ -70,13 +71,18 @@ fn instruction_sets_agree_to_single_precision() {
 }
 
 /// Sixteen lanes compute what eight do, in the same order. The bar turns far, so that batches beside each other need
-/// different numbers of iterations for their rotations.
+/// different numbers of iterations for their rotations. A cut takes some of its strips of tetrahedra apart.
 #[test]
 fn two_batches_at_once_have_the_bits_of_one_after_the_other() {
     let hash_with = |simd| {
         let mut body = bar(1, simd);
         let mut octree = cells(simd);
-        for _ in 0..15 {
+        for k in 0..15 {
+            if k == 8 {
+                let at = |x: f64| [Vector3::new(x, -1.0, 0.11), Vector3::new(x, 1.0, 0.11)];
+                let report = body.cut(&BladeSweep { segments: vec![at(0.4), at(0.6)] }, 1).unwrap();
+                assert!(report.new_copies.len() > 20);
+            }
             let spring = push(&body, 0.1);
             body.step(0.02, DOWN, &[spring]);
             octree.step(0.02, DOWN, &[]);
