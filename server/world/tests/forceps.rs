@@ -132,16 +132,17 @@ fn jaws_close_to_the_force_of_the_grip_and_hold_without_drift() {
     let at_rest = table.positions();
     table.hold(around(), 1.0);
     let lift = around() + V::new(0.0, 0.0, 0.001);
-    let gripped = table.hold(lift, 1.0);
+    // After a jump by a millimetre the tissue settles for some seconds.
+    let gripped = table.hold(lift, 3.0);
     let held = gripped.held_m.unwrap();
     assert!(gripped.force_n.z < -0.05, "the tissue pulls back: {}", gripped.force_n);
     assert!(gripped.closed > 0.3 && gripped.closed < 1.0, "the sheet keeps them apart: {}", gripped.closed);
     let (then, before) = (table.positions(), gripped.force_n);
     assert!(farthest(&then, &at_rest) > 3e-4);
-    let later = table.hold(lift, 10.0);
-    assert!((later.held_m.unwrap() - held).norm() < 2e-6, "{} {held}", later.held_m.unwrap());
-    assert!(farthest(&then, &table.positions()) < 5e-6, "{}", farthest(&then, &table.positions()));
-    assert!((later.force_n - before).norm() < 0.01 * before.norm());
+    let later = table.hold(lift, 8.0);
+    assert!((later.held_m.unwrap() - held).norm() < 1e-7, "{} {held}", later.held_m.unwrap());
+    assert!(farthest(&then, &table.positions()) < 1e-7, "{}", farthest(&then, &table.positions()));
+    assert!((later.force_n - before).norm() < 1e-4 * before.norm());
 }
 
 #[test]
