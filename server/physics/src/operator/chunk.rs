@@ -7,7 +7,7 @@ use super::chunks::{NO_PIECE, pack, plan_chunk};
 use super::edges::EdgeBlocks;
 use super::kernel::Batches;
 use super::shared_lanes::Merged;
-use super::strips::{AS_IN_MESH, Corners};
+use super::strips::{AS_IN_MESH, Corners, corners_of};
 use super::tet_batch::{Block6, Coefficients, EnergyCoefficients, Locals, RestBatch};
 use super::{Padded, padded};
 use crate::element::{LANES, Simd};
@@ -25,7 +25,7 @@ pub struct Chunk {
     /// Copy of every local number, ascending. The last local number is the waste bin of unused lanes.
     pub copies: Vec<u32>,
     pieces: Vec<[u32; LANES]>,
-    /// Order of the corners in every lane of the first batches, those of strips; elsewhere it is that of the mesh.
+    /// Order of the corners in every lane of the batches of strips, which come first.
     corners: Vec<[Corners; LANES]>,
     batches: Batches,
     positions: Vec<[f64; 4]>,
@@ -67,7 +67,7 @@ impl Chunk {
             let mut batch = RestBatch::empty();
             for (lane, &p) in lanes.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
                 let rotation = pieces.binary_search(&p).ok().map(|at| &members[at].rotation);
-                let corners = plan.corners.get(b).map_or(AS_IN_MESH, |lanes| lanes[lane]);
+                let corners = corners_of(&plan.corners, b, lane);
                 batch.set(lane, mesh, (&merged[p as usize], corners), rotation);
             }
             rest.push(batch);
@@ -78,8 +78,8 @@ impl Chunk {
         resize_reserving(&mut positions, n, [0.0; 4]);
         Self {
             group,
+            batches: Batches::new(&plan.nodes, rest, n, plan.corners.len()),
             corners: plan.corners,
-            batches: Batches::new(&plan.nodes, rest, n, plan.n_strips),
             pieces: plan.pieces,
             rest: rest_positions(&plan.copies, &pieces, mesh, merged),
             edges: None,
@@ -160,7 +160,7 @@ impl Chunk {
         let places = free_lanes(&mut self.pieces, added, &held, n);
         self.batches.grow(self.pieces.len(), n);
         for (p, batch, lane) in amended {
-            let (ids, corners) = (locals(p), self.corners.get(batch).map_or(AS_IN_MESH, |lanes| lanes[lane]));
+            let (ids, corners) = (locals(p), corners_of(&self.corners, batch, lane));
             self.batches.set_nodes(batch, lane, corners.map(|c| ids[c as usize]));
             self.batches.rest_mut(batch).set_volume(lane, mesh, &merged[p as usize]);
             self.unassembled.push([batch, lane]);

@@ -22,9 +22,8 @@ pub struct ChunkPlan {
     /// Copy of every local number, ascending. One more number, `copies.len()`, is the waste bin: unused
     /// lanes read and write there.
     pub copies: Vec<u32>,
-    /// Number of pairs of batches of strips; their tets fill the first batches, six for each pair.
-    pub n_strips: usize,
-    /// Order of the corners in every lane of those batches.
+    /// Order of the corners in every lane of the batches of strips. These are the first ones, six for every pair of
+    /// batches of strips.
     pub corners: Vec<[Corners; LANES]>,
     /// Piece in every lane of every batch, or [`NO_PIECE`].
     pub pieces: Vec<[u32; LANES]>,
@@ -41,8 +40,7 @@ pub fn plan_chunk(chunk: &[u32], copies_of: impl Fn(u32) -> [u32; 4]) -> ChunkPl
     let waste = copies.len() as u16;
     let local = |copy: &u32| copies.binary_search(copy).map_or(waste, |l| l as u16);
     let held: Vec<[u16; 4]> = held.iter().map(|held| held.each_ref().map(local)).collect();
-    let mut plan =
-        ChunkPlan { copies, n_strips: 0, corners: Vec::new(), pieces: Vec::new(), nodes: Vec::new() };
+    let mut plan = ChunkPlan { copies, corners: Vec::new(), pieces: Vec::new(), nodes: Vec::new() };
     let mut single = vec![true; held.len()];
     plan.add_strips(&held, &mut single);
     let rest: Vec<u32> = (0..held.len() as u32).filter(|&item| single[item as usize]).collect();
@@ -85,7 +83,6 @@ impl ChunkPlan {
                     self.nodes.push(ids);
                 }
             }
-            self.n_strips += 1;
         }
     }
 }
@@ -359,6 +356,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::super::groups::Groups;
+    use super::super::strips::corners_of;
     use crate::cut::Piece;
     use crate::material::Regions;
     use crate::mesh::{BoxPattern, box_mesh};
@@ -382,7 +380,7 @@ mod tests {
         for plan in &plans {
             batches += plan.pieces.len();
             in_strips += plan.corners.len() * LANES;
-            assert_eq!(plan.corners.len(), 6 * plan.n_strips);
+            assert_eq!(plan.corners.len() % 6, 0);
             for (b, (lanes, nodes)) in plan.pieces.iter().zip(&plan.nodes).enumerate() {
                 let mut used: Vec<u32> = Vec::new();
                 for lane in 0..LANES {
@@ -390,7 +388,7 @@ mod tests {
                         seen[lanes[lane] as usize] += 1;
                         for (a, ids) in nodes.iter().enumerate() {
                             let copy = plan.copies[ids[lane] as usize];
-                            let corner = plan.corners.get(b).map_or(a, |lanes| lanes[lane][a] as usize);
+                            let corner = corners_of(&plan.corners, b, lane)[a] as usize;
                             assert_eq!(copy, pieces[lanes[lane] as usize].copies[corner]);
                             shared += usize::from(used.contains(&copy));
                             used.push(copy);

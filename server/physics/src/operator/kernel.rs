@@ -5,7 +5,7 @@
 
 use super::tet_batch::{Batch, Coefficients, EnergyCoefficients, Locals, RestBatch};
 use super::tet_lanes::{
-    Three, UpdatedTet, forces, load, read, scatter_block, sum_of_outer_products, tet_edges, update_tet,
+    Three, UpdatedTet, edges, forces, load, read, scatter_block, sum_of_outer_products, tet_edges, update_tet,
 };
 use super::{Padded, strip_kernel};
 use crate::element::{Batched, Ids, LANES, Lanes, Simd, Vector8};
@@ -25,15 +25,15 @@ pub struct Batches {
 }
 
 impl Batches {
-    /// Batches with the local numbers `nodes`, all below `n_locals`, and their rest states. The first `n_strips`
-    /// times [`strip_kernel::BATCHES`] of them are strips.
-    pub fn new(nodes: &[[Ids; 4]], rest: Vec<RestBatch>, n_locals: usize, n_strips: usize) -> Self {
+    /// Batches with the local numbers `nodes`, all below `n_locals`, and their rest states. The first `n_in_strips` of
+    /// them, a multiple of [`strip_kernel::BATCHES`], make up strips.
+    pub fn new(nodes: &[[Ids; 4]], rest: Vec<RestBatch>, n_locals: usize, n_in_strips: usize) -> Self {
         assert_eq!(nodes.len(), rest.len());
         assert!(nodes.iter().flatten().flatten().all(|&id| (id as usize) < n_locals));
         let zero = Lanes::default();
         let mut live = Vec::with_capacity(rest.capacity());
         live.extend(nodes.iter().map(|&nodes| Batch { g: [[zero; 3]; 3], nodes }));
-        let joined = live.as_chunks().0.iter().take(n_strips).map(strip_kernel::is_joined).collect();
+        let joined = live[..n_in_strips].as_chunks().0.iter().map(strip_kernel::is_joined).collect();
         Self { live, rest, joined, ratio: 0.0, n_locals }
     }
 
@@ -118,7 +118,7 @@ impl Batches {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
             Simd::Avx512 => unsafe { avx512::apply(self, x, y) },
-            _ => apply_each::<Lanes>(self, x, y),
+            _ => apply_all::<Lanes, 1>(self, x, y),
         }
     }
 
@@ -135,7 +135,7 @@ impl Batches {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
             Simd::Avx512 => unsafe { avx512::update(self, c, locals) },
-            _ => update_each::<Lanes>(self, c, locals),
+            _ => update_all::<Lanes, 1>(self, c, locals),
         }
     }
 
@@ -165,20 +165,15 @@ fn apply_with<V: Batched<N>, const N: usize>(
     let ratio = V::splat(ratio);
     for b in batches {
         // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
-        let (u0, mut d) = unsafe {
-            let d = [
+        let u = unsafe {
+            [
+                V::gather_all(x, b, |b| &b.nodes[0]),
                 V::gather_all(x, b, |b| &b.nodes[1]),
                 V::gather_all(x, b, |b| &b.nodes[2]),
                 V::gather_all(x, b, |b| &b.nodes[3]),
-            ];
-            (V::gather_all(x, b, |b| &b.nodes[0]), d)
+            ]
         };
-        for k in 0..3 {
-            for i in 0..3 {
-                d[k][i] = d[k][i] - u0[i];
-            }
-        }
-        let f = forces(&read(b, |b| &b.g), &d, ratio);
+        let f = forces(&read(b, |b| &b.g), &edges(u[0], u[1], u[2], u[3]), ratio);
         scatter_forces(y, b, &f);
     }
 }
@@ -211,32 +206,42 @@ fn update_with<V: Batched<N>, const N: usize>(
     inverted
 }
 
-/// y += s K̂ x, batch after batch.
+/// y += s K̂ x, as many batches at once as V holds; one that is left over alone.
 #[inline(always)]
-fn apply_each<V: Vector8>(of: &Batches, x: &[Padded], y: &mut [Padded]) {
+fn apply_all<V: Batched<N>, const N: usize>(of: &Batches, x: &[Padded], y: &mut [Padded]) {
     let (strips, single) = of.live.split_at(strip_kernel::BATCHES * of.joined.len());
     for (strips, &joined) in strips.as_chunks().0.iter().zip(&of.joined) {
         match joined {
-            true => strip_kernel::apply_each::<V>(strips, of.ratio, x, y),
-            false => apply_with::<V, 1>(strips.as_chunks().0, of.ratio, x, y),
+            true => strip_kernel::apply::<V, N>(strips, of.ratio, x, y),
+            false => apply_with::<V, N>(strips.as_chunks().0, of.ratio, x, y),
         }
     }
-    apply_with::<V, 1>(single.as_chunks().0, of.ratio, x, y);
+    let (whole, last) = single.as_chunks();
+    apply_with::<V, N>(whole, of.ratio, x, y);
+    apply_with::<V::Part, 1>(last.as_chunks().0, of.ratio, x, y);
 }
 
+/// Updates them in the same way.
 #[inline(always)]
-fn update_each<V: Vector8>(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+fn update_all<V: Batched<N>, const N: usize>(
+    of: &mut Batches,
+    c: &Coefficients,
+    locals: &mut Locals<'_>,
+) -> usize {
     let n = strip_kernel::BATCHES * of.joined.len();
     let ((strips, single), (strips_rest, single_rest)) = (of.live.split_at_mut(n), of.rest.split_at_mut(n));
     let strips = strips.as_chunks_mut().0.iter_mut().zip(strips_rest.as_chunks_mut().0);
     let mut inverted = 0;
     for ((live, rest), &joined) in strips.zip(&of.joined) {
         inverted += match joined {
-            true => strip_kernel::update_each::<V>(c, rest, live, locals),
-            false => update_with::<V, 1>(c, rest.as_chunks_mut().0, live.as_chunks_mut().0, locals),
+            true => strip_kernel::update::<V, N>(c, rest, live, locals),
+            false => update_with::<V, N>(c, rest.as_chunks_mut().0, live.as_chunks_mut().0, locals),
         };
     }
-    inverted + update_with::<V, 1>(c, single_rest.as_chunks_mut().0, single.as_chunks_mut().0, locals)
+    let ((whole, last), (whole_rest, last_rest)) = (single.as_chunks_mut(), single_rest.as_chunks_mut());
+    inverted
+        + update_with::<V, N>(c, whole_rest, whole, locals)
+        + update_with::<V::Part, 1>(c, last_rest.as_chunks_mut().0, last.as_chunks_mut().0, locals)
 }
 
 /// Σ w V (μ |D|² + λ/2 (R : D)²), where D = F − R, or sym(F) − I without rotations. F is I plus the gradient of
@@ -299,12 +304,12 @@ mod avx2 {
 
     #[target_feature(enable = "avx2,fma")]
     pub fn apply(of: &Batches, x: &[Padded], y: &mut [Padded]) {
-        super::apply_each::<Register>(of, x, y);
+        super::apply_all::<Register, 1>(of, x, y);
     }
 
     #[target_feature(enable = "avx2,fma")]
     pub fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
-        super::update_each::<Register>(of, c, locals)
+        super::update_all::<Register, 1>(of, c, locals)
     }
 
     #[target_feature(enable = "avx2,fma")]
@@ -317,42 +322,16 @@ mod avx2 {
 mod avx512 {
     //! The same loops for two batches at once; one that is left over takes AVX2.
 
-    use super::{Batches, Coefficients, Locals, Padded, apply_with, strip_kernel, update_with};
-    use crate::element::avx2::Register;
+    use super::{Batches, Coefficients, Locals, Padded};
     use crate::element::avx512::Register512;
 
     #[target_feature(enable = "avx512f,avx2,fma")]
     pub fn apply(of: &Batches, x: &[Padded], y: &mut [Padded]) {
-        let (strips, single) = of.live.split_at(strip_kernel::BATCHES * of.joined.len());
-        for (strips, &joined) in strips.as_chunks().0.iter().zip(&of.joined) {
-            match joined {
-                true => strip_kernel::apply_pair::<Register512>(strips, of.ratio, x, y),
-                false => apply_with::<Register512, 2>(strips.as_chunks().0, of.ratio, x, y),
-            }
-        }
-        let (pairs, last) = single.as_chunks();
-        apply_with::<Register512, 2>(pairs, of.ratio, x, y);
-        apply_with::<Register, 1>(last.as_chunks().0, of.ratio, x, y);
+        super::apply_all::<Register512, 2>(of, x, y);
     }
 
     #[target_feature(enable = "avx512f,avx2,fma")]
     pub fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
-        let n = strip_kernel::BATCHES * of.joined.len();
-        let ((strips, single), (strips_rest, single_rest)) =
-            (of.live.split_at_mut(n), of.rest.split_at_mut(n));
-        let strips = strips.as_chunks_mut().0.iter_mut().zip(strips_rest.as_chunks_mut().0);
-        let mut inverted = 0;
-        for ((live, rest), &joined) in strips.zip(&of.joined) {
-            inverted += match joined {
-                true => strip_kernel::update_pair::<Register512>(c, rest, live, locals),
-                false => {
-                    update_with::<Register512, 2>(c, rest.as_chunks_mut().0, live.as_chunks_mut().0, locals)
-                }
-            };
-        }
-        let ((pairs, last), (pairs_rest, last_rest)) = (single.as_chunks_mut(), single_rest.as_chunks_mut());
-        inverted
-            + update_with::<Register512, 2>(c, pairs_rest, pairs, locals)
-            + update_with::<Register, 1>(c, last_rest.as_chunks_mut().0, last.as_chunks_mut().0, locals)
+        super::update_all::<Register512, 2>(of, c, locals)
     }
 }

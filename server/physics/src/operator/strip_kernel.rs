@@ -6,13 +6,11 @@
 
 #![allow(unsafe_code)] // unchecked gathers
 
-use std::array::{from_mut, from_ref};
-
 use super::Padded;
 use super::strips::{NODES, TETS};
 use super::tet_batch::{Batch, Coefficients, Locals, RestBatch};
-use super::tet_lanes::{Three, forces, read, scatter_block, tet_edges, update_tet};
-use crate::element::{Batched, Ids, Vector, Vector8};
+use super::tet_lanes::{Three, edges, forces, read, scatter_block, tet_edges, update_tet};
+use crate::element::{Batched, Ids, Vector};
 
 /// Batches of tets that two batches of strips consist of.
 pub const BATCHES: usize = 2 * TETS;
@@ -23,20 +21,19 @@ pub fn is_joined(batches: &[Batch; BATCHES]) -> bool {
     (0..BATCHES - 2).all(|b| follows(&batches[b], &batches[b + 2]))
 }
 
-/// y += s K̂ x for two batches of strips at once.
+/// y += s K̂ x, as many batches of strips at once as V holds.
 #[inline(always)]
-pub fn apply_pair<V: Batched<2>>(batches: &[Batch; BATCHES], ratio: f32, x: &[Padded], y: &mut [Padded]) {
-    if let [first, second, third] = batches.as_chunks().0 {
-        apply::<V, 2>([first, second, third], ratio, x, y);
+pub fn apply<V: Batched<N>, const N: usize>(
+    batches: &[Batch; BATCHES],
+    ratio: f32,
+    x: &[Padded],
+    y: &mut [Padded],
+) {
+    let [first, second, third] = batches.as_chunks::<2>().0 else { return };
+    let tets = first.as_chunks().0.iter().zip(second.as_chunks().0).zip(third.as_chunks().0);
+    for ((first, second), third) in tets {
+        apply_strips::<V, N>([first, second, third], ratio, x, y);
     }
-}
-
-/// The same for one batch of strips after the other.
-#[inline(always)]
-pub fn apply_each<V: Vector8>(batches: &[Batch; BATCHES], ratio: f32, x: &[Padded], y: &mut [Padded]) {
-    let [a, b, c, d, e, f] = batches;
-    apply::<V, 1>([from_ref(a), from_ref(c), from_ref(e)], ratio, x, y);
-    apply::<V, 1>([from_ref(b), from_ref(d), from_ref(f)], ratio, x, y);
 }
 
 /// Local numbers of the copies of the strips in one batch.
@@ -47,7 +44,7 @@ fn nodes<'a>(first: &'a Batch, second: &'a Batch, third: &'a Batch) -> [&'a Ids;
 }
 
 #[inline(always)]
-fn apply<V: Batched<N>, const N: usize>(
+fn apply_strips<V: Batched<N>, const N: usize>(
     [first, second, third]: [&[Batch; N]; TETS],
     ratio: f32,
     x: &[Padded],
@@ -69,18 +66,6 @@ fn apply<V: Batched<N>, const N: usize>(
     let q = forces(&read(second, |b| &b.g), &edges(u[1], u[2], u[3], u[4]), ratio);
     let r = forces(&read(third, |b| &b.g), &edges(u[2], u[3], u[4], u[5]), ratio);
     scatter([first, second, third], y, &joined(p, q, r));
-}
-
-/// The vectors from one point to three others.
-#[inline(always)]
-fn edges<V: Vector>(from: Three<V>, a: Three<V>, b: Three<V>, c: Three<V>) -> [Three<V>; 3] {
-    let mut d = [a, b, c];
-    for k in 0..3 {
-        for i in 0..3 {
-            d[k][i] = d[k][i] - from[i];
-        }
-    }
-    d
 }
 
 /// What corners of three tets have, summed up by the copies of their strip.
@@ -106,37 +91,27 @@ fn scatter<V: Batched<N>, const N: usize>(
     unsafe { V::scatter_all(y, |batch| nodes(&first[batch], &second[batch], &third[batch]), f) };
 }
 
-/// Updates two batches of strips at once. Returns the number of pieces with det F ≤ 0.
+/// Updates them in the same way. Returns the number of pieces with det F ≤ 0.
 #[inline(always)]
-pub fn update_pair<V: Batched<2>>(
+pub fn update<V: Batched<N>, const N: usize>(
     c: &Coefficients,
     rest: &mut [RestBatch; BATCHES],
     live: &mut [Batch; BATCHES],
     locals: &mut Locals<'_>,
 ) -> usize {
-    match (rest.as_chunks_mut().0, live.as_chunks_mut().0) {
-        ([p, q, r], [first, second, third]) => update::<V, 2>(c, [p, q, r], [first, second, third], locals),
-        _ => 0,
+    let [first, second, third] = live.as_chunks_mut::<2>().0 else { return 0 };
+    let [p, q, r] = rest.as_chunks_mut::<2>().0 else { return 0 };
+    let tets = first.as_chunks_mut().0.iter_mut().zip(second.as_chunks_mut().0).zip(third.as_chunks_mut().0);
+    let rest = p.as_chunks_mut().0.iter_mut().zip(q.as_chunks_mut().0).zip(r.as_chunks_mut().0);
+    let mut inverted = 0;
+    for (((first, second), third), ((p, q), r)) in tets.zip(rest) {
+        inverted += update_strips::<V, N>(c, [p, q, r], [first, second, third], locals);
     }
-}
-
-/// The same for one batch of strips after the other.
-#[inline(always)]
-pub fn update_each<V: Vector8>(
-    c: &Coefficients,
-    rest: &mut [RestBatch; BATCHES],
-    live: &mut [Batch; BATCHES],
-    locals: &mut Locals<'_>,
-) -> usize {
-    let ([p, s, q, t, r, u], [a, b, d, e, f, g]) = (rest, live);
-    let (p, q, r) = (from_mut(p), from_mut(q), from_mut(r));
-    let (s, t, u) = (from_mut(s), from_mut(t), from_mut(u));
-    update::<V, 1>(c, [p, q, r], [from_mut(a), from_mut(d), from_mut(f)], locals)
-        + update::<V, 1>(c, [s, t, u], [from_mut(b), from_mut(e), from_mut(g)], locals)
+    inverted
 }
 
 #[inline(always)]
-fn update<V: Batched<N>, const N: usize>(
+fn update_strips<V: Batched<N>, const N: usize>(
     c: &Coefficients,
     [rest_1, rest_2, rest_3]: [&mut [RestBatch; N]; TETS],
     [first, second, third]: [&mut [Batch; N]; TETS],

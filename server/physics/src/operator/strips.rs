@@ -1,7 +1,9 @@
 //! Strips: three tets in a row, each of which shares a face with the one before.
 //!
 //! A strip has six copies where three tets alone have twelve. Most of the time of an application goes into reading and
-//! adding up rows of copies, so tets in strips take little more than half of it.
+//! adding up rows of copies, so tets in strips take two thirds of it.
+
+use crate::element::LANES;
 
 /// Tets of a strip.
 pub const TETS: usize = 3;
@@ -13,6 +15,12 @@ pub type Corners = [u8; 4];
 
 /// Corners in the order of the mesh.
 pub const AS_IN_MESH: Corners = [0, 1, 2, 3];
+
+/// Order of the corners of one lane, given those of the batches that are strips. These come first; in all others it is
+/// that of the mesh.
+pub fn corners_of(strips: &[[Corners; LANES]], batch: usize, lane: usize) -> Corners {
+    strips.get(batch).map_or(AS_IN_MESH, |lanes| lanes[lane])
+}
 
 /// No tet.
 const NONE: u32 = u32::MAX;

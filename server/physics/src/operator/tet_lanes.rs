@@ -65,6 +65,18 @@ pub fn sum_of_outer_products<V: Vector>(d: &[[V; 3]; 3], g: &[[V; 3]; 3]) -> [[V
     H
 }
 
+/// The vectors from one point to three others.
+#[inline(always)]
+pub fn edges<V: Vector>(from: Three<V>, a: Three<V>, b: Three<V>, c: Three<V>) -> [Three<V>; 3] {
+    let mut d = [a, b, c];
+    for k in 0..3 {
+        for i in 0..3 {
+            d[k][i] = d[k][i] - from[i];
+        }
+    }
+    d
+}
+
 /// Forces σ g′_k on the corners k = 1, 2, 3, and on corner 0, of tets with the edges `d` from corner 0.
 #[inline(always)]
 pub fn forces<V: Vector>(g: &[Three<V>; 3], d: &[Three<V>; 3], ratio: V) -> [Three<V>; 4] {
