@@ -270,8 +270,10 @@ impl BodySettings {
 
     /// How the fast path applies the stiffness of `pieces` pieces; never [`OperatorChoice::Auto`].
     pub fn operator(&self, law: Law, pieces: usize) -> OperatorChoice {
+        if self.has_cells() {
+            return OperatorChoice::MatrixFree;
+        }
         match self.operator {
-            _ if self.has_cells() => OperatorChoice::MatrixFree,
             OperatorChoice::Auto => cost::cheapest(law, pieces, (self.solver, self.method)),
             asked => asked,
         }
