@@ -163,6 +163,7 @@ pub struct RawSolver {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub precision: Option<RawPrecision>,
     /// How the stiffness is applied in single precision. Default: the faster of the two by measured costs.
+    /// Cells of an `octree`, and of a `hex8` box of equal cubes, have no matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub operator: Option<RawOperator>,
     /// Maximum number of Newton iterations per time step. Default: 1 for linear and corotational bodies in
