@@ -202,6 +202,8 @@ pub trait Vector8: Vector {
     fn load_half(halves: &Halves) -> Self;
     /// Writes eight numbers to memory.
     fn store(self) -> Lanes;
+    /// Writes eight numbers to memory in half precision, rounded to nearest.
+    fn store_half(self) -> Halves;
     /// The transpose of eight rows.
     fn transposed(rows: [Self; 8]) -> [Self; 8];
 
@@ -280,6 +282,10 @@ impl Vector8 for Lanes {
     #[inline(always)]
     fn store(self) -> Lanes {
         self
+    }
+
+    fn store_half(self) -> Halves {
+        Halves(self.0.map(|number| f16::from_f32(number).to_bits()))
     }
 
     #[inline(always)]

@@ -6,23 +6,31 @@ use nalgebra::Matrix3;
 
 use super::super::tet_batch::Block6;
 use super::batch::SectorBatch;
+use super::interleave::interleave;
 use super::sectors::{ENTRY, Matrix24, SectorTable, diagonal_blocks};
 use super::stored::{Entry, StoredBatch, stored_entry};
 use crate::element::{Ids, LANES, Lanes, Simd, Vector8};
 
 /// Diagonal blocks (xx, xy, xz, yy, yz, zz) of a table in the frame of a cell, by the set of hanging slots.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct BlockTable(Vec<[[f32; 6]; 8]>);
+pub struct BlockTable(#[serde(with = "crate::storage::saved::arrays")] Vec<[f32; BLOCKS]>);
+
+/// Entries of the blocks of all slots, one block after the other.
+const BLOCKS: usize = 48;
 
 impl BlockTable {
     /// The blocks of all sets of slots 1 … 6.
     pub fn new(table: &SectorTable) -> Self {
         let K = table.matrix();
-        Self((0..64).map(|set| rounded(&K, set << 1)).collect())
+        let of = |set: u8| {
+            let blocks = rounded(&K, set << 1);
+            std::array::from_fn(|k| blocks[k / 6][k % 6])
+        };
+        Self((0..64).map(of).collect())
     }
 
     /// Blocks of a cell whose slots `hanging` hang.
-    fn of(&self, hanging: u8) -> &[[f32; 6]; 8] {
+    fn of(&self, hanging: u8) -> &[f32; BLOCKS] {
         &self.0[usize::from(hanging >> 1 & 63)]
     }
 }
@@ -65,13 +73,17 @@ unsafe fn add_with<V: Vector8>(
         let R: [[V; 3]; 3] = [load(&batch.rotation, 0), load(&batch.rotation, 1), load(&batch.rotation, 2)];
         match hanging.get(b) {
             // SAFETY: the caller's promise.
-            None => unsafe { add_plain(&R, &table.of(0)[0], &batch.nodes, rows) },
+            None => unsafe { add_plain(&R, table.of(0), &batch.nodes, rows) },
             Some(hanging) => {
-                let blocks = lanes_of(table, hanging);
-                for j in 0..8 {
-                    let block = turned(&R, &blocks[j]);
+                let mut from = [table.of(0); LANES];
+                for lane in 0..LANES {
+                    from[lane] = table.of(hanging[lane]);
+                }
+                let mut blocks = [Lanes::default(); BLOCKS];
+                interleave::<V, BLOCKS>(&from, &mut blocks);
+                for (block, ids) in blocks.as_chunks().0.iter().zip(&batch.nodes) {
                     // SAFETY: the caller's promise.
-                    unsafe { V::scatter_blocks(rows, &batch.nodes[j], block) };
+                    unsafe { V::scatter_blocks(rows, ids, turned(&R, block)) };
                 }
             }
         }
@@ -81,16 +93,6 @@ unsafe fn add_with<V: Vector8>(
 #[inline(always)]
 fn load<V: Vector8>(R: &[Lanes; 9], i: usize) -> [V; 3] {
     [V::load(&R[3 * i]), V::load(&R[3 * i + 1]), V::load(&R[3 * i + 2])]
-}
-
-fn lanes_of(table: &BlockTable, hanging: &[u8; LANES]) -> [[Lanes; 6]; 8] {
-    let mut blocks = [[Lanes::default(); 6]; 8];
-    for (lane, &set) in hanging.iter().enumerate() {
-        for (to, from) in blocks.iter_mut().flatten().zip(table.of(set).iter().flatten()) {
-            to.0[lane] = *from;
-        }
-    }
-    blocks
 }
 
 /// R B Rᵀ.
@@ -112,13 +114,13 @@ fn turned<V: Vector8>(R: &[[V; 3]; 3], B: &[Lanes; 6]) -> [V; 6] {
     out
 }
 
-/// Adds the blocks of eight cells without hanging corners. They differ from that of slot 0 by the signs of
+/// Adds the blocks of eight cells without hanging corners; that of slot 0 is the first of `B`. They differ from that of slot 0 by the signs of
 /// reflections only, so those of opposite slots are equal.
 ///
 /// # Safety
 /// All local numbers are below the length of `rows`.
 #[inline(always)]
-unsafe fn add_plain<V: Vector8>(R: &[[V; 3]; 3], B: &[f32; 6], nodes: &[Ids; 8], rows: &mut [Block6]) {
+unsafe fn add_plain<V: Vector8>(R: &[[V; 3]; 3], B: &[f32; BLOCKS], nodes: &[Ids; 8], rows: &mut [Block6]) {
     // The parts of the diagonal and of the entries xy, xz, yz of B.
     let mut parts = [[V::splat(0.0); 6]; 4];
     for i in 0..3 {

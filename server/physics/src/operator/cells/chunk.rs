@@ -272,12 +272,11 @@ impl CellChunk {
         }
     }
 
-    /// Sets stored matrices; `of` writes that of the cell with the given number and returns `true`, or leaves the
-    /// cell as it is.
-    pub fn set_stored(&mut self, of: &impl Fn(u32, &mut [f32; STORED]) -> bool) {
+    /// Sets stored matrices as in [`CellOperator::set_stored`](super::CellOperator::set_stored).
+    pub fn set_stored<'a>(&mut self, simd: Simd, order: &[u16; STORED], of: &impl Fn(u32) -> Given<'a>) {
         let (single, half) = self.lanes[self.batches.len()..].split_at(self.stored.len());
-        set_matrices(&mut self.stored, single, of);
-        set_matrices(&mut self.half, half, of);
+        set_matrices(simd, (&mut self.stored, single), order, of);
+        set_matrices(simd, (&mut self.half, half), order, of);
     }
 
     /// Bytes in use: all but stored matrices, and these.
@@ -302,18 +301,33 @@ impl CellChunk {
     }
 }
 
+/// The matrix of a cell.
+#[derive(Clone, Copy, Debug)]
+pub struct Given<'a> {
+    /// Its upper triangle.
+    pub entries: &'a [f32; STORED],
+    /// Whether it is another one than before.
+    pub changed: bool,
+}
+
 /// Sets matrices of these batches as in [`CellChunk::set_stored`].
-fn set_matrices<E: Entry>(
-    batches: &mut [StoredBatch<E>],
-    lanes: &[BatchLanes],
-    of: &impl Fn(u32, &mut [f32; STORED]) -> bool,
+fn set_matrices<'a, E: Entry>(
+    simd: Simd,
+    (batches, lanes): (&mut [StoredBatch<E>], &[BatchLanes]),
+    order: &[u16; STORED],
+    of: &impl Fn(u32) -> Given<'a>,
 ) {
-    let mut entries = [0.0; STORED];
     for (batch, lanes) in batches.iter_mut().zip(lanes) {
-        for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
-            if of(cell, &mut entries) {
-                batch.set(lane, &entries);
-            }
+        let mut from = [&[0.0; STORED]; LANES];
+        let mut any = false;
+        for (from, &cell) in from.iter_mut().zip(&lanes.cells).filter(|(_, cell)| **cell != NO_PIECE) {
+            let given = of(cell);
+            *from = given.entries;
+            any |= given.changed;
+        }
+        // Lanes beside a changed one get what they had.
+        if any {
+            batch.set(simd, &from, order);
         }
     }
 }

@@ -15,6 +15,7 @@
 mod sectors;
 mod lane;
 mod batch;
+mod interleave;
 mod stored;
 mod blocks;
 mod chunk;
@@ -22,6 +23,7 @@ mod operator;
 mod update;
 mod stiffness;
 
+pub use chunk::Given;
 pub use lane::{CellLane, CellMatrix, slot_corners, slot_hanging};
 pub use operator::{CellOperator, morton_order};
 pub use sectors::{ENTRY, Matrix24, SectorTable, unit_stiffness};

@@ -12,7 +12,7 @@ use super::super::tet_batch::Block6;
 use super::super::{BLOCK, LinearOperator, Padded, block_of};
 use super::batch::TableLanes;
 use super::blocks::BlockTable;
-use super::chunk::{CellChunk, Table};
+use super::chunk::{CellChunk, Given, Table};
 use super::lane::{CellLane, CellMatrix};
 use super::sectors::SectorTable;
 use super::stored::STORED;
@@ -116,10 +116,16 @@ impl CellOperator {
         team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].set_rotations(&of));
     }
 
-    /// Sets stored matrices: `of` writes the upper triangle of the matrix of the cell with the given number, row by
-    /// row, and returns `true`, or leaves it as it is. Row 3 j + i is component i of slot j.
-    pub fn set_stored(&mut self, team: &mut Team, of: impl Fn(u32, &mut [f32; STORED]) -> bool + Sync) {
-        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].set_stored(&of));
+    /// Sets stored matrices: `of` gives that of the cell with the given number. Entry k of the upper triangle, row by
+    /// row, is number `order[k]` of what it gives. Row 3 j + i is component i of slot j.
+    pub fn set_stored<'a>(
+        &mut self,
+        team: &mut Team,
+        order: &[u16; STORED],
+        of: impl Fn(u32) -> Given<'a> + Sync,
+    ) {
+        let simd = self.simd;
+        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].set_stored(simd, order, &of));
     }
 
     /// Sets the rotation R of every cell with a stored matrix A, which then stands for R A Rᵀ.

@@ -4,7 +4,6 @@
 
 use std::array::from_ref;
 
-use half::f16;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -13,6 +12,7 @@ use super::batch::{
     Corners, HangingWeights, distribute, from_cell, gather, interpolate, read_matrix, read_weights, scatter,
     to_cell,
 };
+use super::interleave::interleave;
 use super::sectors::Matrix24;
 use crate::element::{Halves, Ids, LANES, Lanes, Mat3, Simd, Vector8};
 
@@ -31,8 +31,8 @@ pub trait Entry: Copy + Default + Serialize + DeserializeOwned {
 
     /// All eight.
     fn load<V: Vector8>(&self) -> V;
-    /// That of one lane.
-    fn set(&mut self, lane: usize, value: f32);
+    /// The eight numbers of a register.
+    fn store<V: Vector8>(all: V) -> Self;
 }
 
 impl Entry for Lanes {
@@ -44,8 +44,8 @@ impl Entry for Lanes {
     }
 
     #[inline(always)]
-    fn set(&mut self, lane: usize, value: f32) {
-        self.0[lane] = value;
+    fn store<V: Vector8>(all: V) -> Self {
+        all.store()
     }
 }
 
@@ -58,8 +58,8 @@ impl Entry for Halves {
     }
 
     #[inline(always)]
-    fn set(&mut self, lane: usize, value: f32) {
-        self.0[lane] = f16::from_f32(value).to_bits();
+    fn store<V: Vector8>(all: V) -> Self {
+        all.store_half()
     }
 }
 
@@ -87,12 +87,32 @@ impl<E: Entry> StoredBatch<E> {
         Self { entries: [E::default(); STORED], scale: Lanes([1.0; LANES]), rotation, nodes }
     }
 
-    /// Sets the upper triangle of the matrix of a lane.
-    pub fn set(&mut self, lane: usize, entries: &[f32; STORED]) {
-        let scale = E::LARGEST.map_or(1.0, |largest| scale(entries, largest));
-        self.scale.0[lane] = scale;
-        let inverse = 1.0 / scale;
-        self.entries.iter_mut().zip(entries).for_each(|(to, from)| to.set(lane, inverse * from));
+    /// Sets the matrices of all lanes. Entry k of the upper triangle is number `order[k]` of what `from` has.
+    pub fn set(&mut self, simd: Simd, from: &[&[f32; STORED]; LANES], order: &[u16; STORED]) {
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: both come from `Simd::detect` only.
+            Simd::Avx2 | Simd::Avx512 => unsafe { avx2::set(self, from, order) },
+            _ => self.set_with::<Lanes>(from, order),
+        }
+    }
+
+    #[inline(always)]
+    fn set_with<V: Vector8>(&mut self, from: &[&[f32; STORED]; LANES], order: &[u16; STORED]) {
+        let mut given = [Lanes::default(); STORED];
+        interleave::<V, STORED>(from, &mut given);
+        let mut inverse = Lanes([1.0; LANES]);
+        if let Some(largest) = E::LARGEST {
+            let most = largest_of(&given);
+            for lane in 0..LANES {
+                self.scale.0[lane] = scale(most.0[lane], largest);
+                inverse.0[lane] = 1.0 / self.scale.0[lane];
+            }
+        }
+        let inverse = V::load(&inverse);
+        for (to, &from) in self.entries.iter_mut().zip(order) {
+            *to = E::store(inverse * V::load(&given[usize::from(from)]));
+        }
     }
 
     /// The matrix A of a lane, without its rotation.
@@ -109,9 +129,21 @@ impl<E: Entry> StoredBatch<E> {
     }
 }
 
-/// The power of two by which entries are divided so that the largest comes close to `largest` from below.
-fn scale(entries: &[f32], largest: f32) -> f32 {
-    let most = entries.iter().fold(0.0_f32, |most, entry| most.max(entry.abs()));
+/// The largest magnitude in every lane; numbers that are none do not count.
+#[inline(always)]
+fn largest_of(entries: &[Lanes; STORED]) -> Lanes {
+    let mut most = Lanes::default();
+    for entry in entries {
+        for lane in 0..LANES {
+            let size = entry.0[lane].abs();
+            most.0[lane] = if size > most.0[lane] { size } else { most.0[lane] };
+        }
+    }
+    most
+}
+
+/// The power of two by which entries up to `most` are divided so that they come close to `largest` from below.
+fn scale(most: f32, largest: f32) -> f32 {
     if !(most > f32::MIN_POSITIVE && most.is_finite()) {
         return 1.0;
     }
@@ -224,8 +256,19 @@ unsafe fn multiply_with<V: Vector8, E: Entry>(
 mod avx2 {
     //! The same loop compiled for AVX2 and FMA.
 
-    use super::{Entry, HangingWeights, Padded, StoredBatch};
+    use super::{Entry, HangingWeights, LANES, Padded, STORED, StoredBatch};
     use crate::element::avx2::Register;
+
+    /// # Safety
+    /// The machine has AVX2, FMA and F16C.
+    #[target_feature(enable = "avx2,fma,f16c")]
+    pub unsafe fn set<E: Entry>(
+        batch: &mut StoredBatch<E>,
+        from: &[&[f32; STORED]; LANES],
+        order: &[u16; STORED],
+    ) {
+        batch.set_with::<Register>(from, order);
+    }
 
     /// # Safety
     /// As for [`super::multiply`].
@@ -246,6 +289,17 @@ mod avx2 {
 mod tests {
     use super::*;
 
+    /// A batch in which one lane has a matrix. The order of what is given is turned round.
+    fn with_lane(simd: Simd, lane: usize, entries: &[f32; STORED]) -> StoredBatch<Halves> {
+        let mut given = *entries;
+        given.reverse();
+        let mut from = [&[0.0; STORED]; LANES];
+        from[lane] = &given;
+        let mut batch = StoredBatch::new([[0; LANES]; 8]);
+        batch.set(simd, &from, &std::array::from_fn(|k| (STORED - 1 - k) as u16));
+        batch
+    }
+
     /// Whatever their unit, entries keep eleven bits, or their error is below 2⁻³⁹ of the largest entry.
     #[test]
     fn half_precision_keeps_eleven_bits_in_any_unit() {
@@ -256,16 +310,18 @@ mod tests {
         let largest = f64::from(entries.iter().fold(0.0_f32, |largest, entry| largest.max(entry.abs())));
         for unit in [1e-35_f32, 1e-20, 1e-3, 1.0, 1e12, 1e37] {
             let scaled = entries.map(|entry| unit * entry);
-            let mut batch = StoredBatch::<Halves>::new([[0; LANES]; 8]);
-            batch.set(3, &scaled);
-            let (found, none) = (batch.matrix(3), batch.matrix(2));
-            for r in 0..24 {
-                for s in r..24 {
-                    let expected = f64::from(scaled[stored_entry(r, s)]);
-                    let error = (found[r][s] - expected).abs();
-                    let allowed = (expected.abs() / 2048.0).max(f64::from(unit) * largest / 2.0_f64.powi(39));
-                    assert!(error <= allowed, "{unit:e}: {expected:e} {:e}", found[r][s]);
-                    assert_eq!((found[s][r], none[r][s]), (found[r][s], 0.0));
+            for simd in [Simd::Baseline, Simd::detect()] {
+                let batch = with_lane(simd, 3, &scaled);
+                let (found, none) = (batch.matrix(3), batch.matrix(2));
+                for r in 0..24 {
+                    for s in r..24 {
+                        let expected = f64::from(scaled[stored_entry(r, s)]);
+                        let error = (found[r][s] - expected).abs();
+                        let allowed =
+                            (expected.abs() / 2048.0).max(f64::from(unit) * largest / 2.0_f64.powi(39));
+                        assert!(error <= allowed, "{simd:?}, {unit:e}: {expected:e} {:e}", found[r][s]);
+                        assert_eq!((found[s][r], none[r][s]), (found[r][s], 0.0));
+                    }
                 }
             }
         }
@@ -273,10 +329,12 @@ mod tests {
 
     #[test]
     fn matrices_without_a_scale_stay_what_they_are() {
-        assert_eq!(scale(&[0.0; STORED], 32768.0), 1.0);
-        assert_eq!(scale(&[1.0, f32::INFINITY], 32768.0), 1.0);
-        let mut batch = StoredBatch::<Halves>::new([[0; LANES]; 8]);
-        batch.set(0, &[f32::NAN; STORED]);
-        assert!(batch.matrix(0)[5][7].is_nan());
+        assert_eq!(scale(0.0, 32768.0), 1.0);
+        assert_eq!(scale(f32::INFINITY, 32768.0), 1.0);
+        for simd in [Simd::Baseline, Simd::detect()] {
+            let batch = with_lane(simd, 0, &[f32::NAN; STORED]);
+            assert!(batch.matrix(0)[5][7].is_nan());
+            assert_eq!(batch.matrix(1), [[0.0; 24]; 24]);
+        }
     }
 }

@@ -390,8 +390,8 @@ fn stored_matrices_do_what_tables_do() {
     {
         let lanes = lanes(own);
         let mut operator = CellOperator::new(simd, &tables, &lanes, &order, n);
-        operator.set_stored(&mut team, |id, entries| {
-            let (id, mut at) = (id as usize, 0);
+        let triangle = |id: usize| -> [f32; STORED] {
+            let (mut entries, mut at) = ([0.0; STORED], 0);
             let K = &units[usize::from(octree.cells()[id].material)];
             let own = octree.cells()[id].octant();
             for r in 0..24 {
@@ -401,8 +401,12 @@ fn stored_matrices_do_what_tables_do() {
                     at += 1;
                 }
             }
-            true
-        });
+            entries
+        };
+        let triangles: Vec<_> = (0..octree.cells().len()).map(triangle).collect();
+        let order = std::array::from_fn(|k| k as u16);
+        let given = |id: u32| Given { entries: &triangles[id as usize], changed: true };
+        operator.set_stored(&mut team, &order, given);
         let (x, mut y, mut expected) = (direction(n), vec![[0.0; 4]; n], vec![[0.0; 4]; n]);
         operator.apply(&mut team, &x, &mut y);
         stiffness.apply(&mut team, &x, &mut expected);

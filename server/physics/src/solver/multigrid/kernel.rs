@@ -10,7 +10,7 @@ use super::matrices::{CellMatrix, LevelMatrices};
 use super::stiff_springs::Columns;
 use crate::element::Simd;
 use crate::operator::cells::{
-    CellLane, CellMatrix as LaneMatrix, CellOperator, STORED, SectorTable, morton_order, slot_corners,
+    CellLane, CellMatrix as LaneMatrix, CellOperator, Given, STORED, SectorTable, morton_order, slot_corners,
     slot_hanging, stored_entry,
 };
 use crate::operator::{BLOCK, Inverse3, LinearOperator, Padded, block_of, invert, rows};
@@ -138,15 +138,13 @@ impl LevelKernel {
         operator.set_rotations(team, rotation);
         operator.set_stored_rotations(team, rotation);
         let (moved, fresh) = (&*moved, std::mem::take(fresh));
-        operator.set_stored(team, |id, entries| {
+        operator.set_stored(team, &UPPER, |id| {
             let id = id as usize;
-            let CellMatrix::Stored(place) = matrices.matrix[id] else { return false };
-            if !(fresh || moved[id] || matrices.changed[id]) {
-                return false;
-            }
-            let packed = &matrices.stored[place as usize].matrix;
-            entries.iter_mut().zip(UPPER).for_each(|(entry, at)| *entry = packed[usize::from(at)]);
-            true
+            let entries = match matrices.matrix[id] {
+                CellMatrix::Stored(place) => &matrices.stored[place as usize].matrix,
+                CellMatrix::Shared(_) => &[0.0; STORED],
+            };
+            Given { entries, changed: fresh || moved[id] || matrices.changed[id] }
         });
     }
 
