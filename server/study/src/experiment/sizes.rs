@@ -1,7 +1,7 @@
 //! Adaptive against uniform cells, and the time per cell from eight thousand cells on.
 
 use super::model::{Cuts, Grid, Model, animal, cube};
-use super::solve::{Solver, Until, run};
+use super::solve::three_cycles;
 use super::system::{Problem, System, smoothers};
 use super::tables::S_CUBE;
 use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
@@ -113,8 +113,7 @@ fn step(model: &Model) -> Result<Step, Trouble> {
     let operator_s = system.update();
     let (mut multigrid, seconds) = system.multigrid(smoothers()[1].1);
     let none = vec![nalgebra::Vector3::zeros(); system.unknowns() / 3];
-    let until = Until { iterations: 3, error: -1.0, seconds: 0.0 };
-    let course = run(&mut system, Solver::Cycles(&mut multigrid), &none, until);
+    let course = three_cycles(&mut system, &mut multigrid, false, &none);
     let multigrid_s = seconds.coarse + course.points.last().map_or(f64::NAN, |point| point.0);
     let [levels, stored] = multigrid.memory();
     drop(multigrid);

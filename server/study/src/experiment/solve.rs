@@ -10,7 +10,7 @@ use scindo_physics::solver::{LinearSettings, LinearSolver, Method, Pcg, PcgSetti
 use scindo_physics::team::Team;
 
 use super::Trouble;
-use super::system::{Seconds, System, norm};
+use super::system::{Seconds, System, TIMES, norm};
 
 type V = Vector3<f64>;
 
@@ -72,14 +72,51 @@ impl<'a> Solver<'a> {
     }
 }
 
-/// Seconds of a step as in the paper, which are those of rotations, operators of all levels and three cycles, whatever
-/// error these leave; and those of its parts.
+/// Cycles are timed again until they have taken so long together [s].
+const LONG_ENOUGH: f64 = 3.0;
+
+/// Three cycles as in a step of the paper, from u = 0, whatever error they leave; the fastest of several times.
+pub fn three_cycles(
+    system: &mut System,
+    multigrid: &mut Multigrid,
+    in_gradients: bool,
+    exact: &[V],
+) -> Course {
+    let until = Until { iterations: 3, error: -1.0, seconds: 0.0 };
+    fastest_course(TIMES, || run(system, Solver::of(multigrid, in_gradients), exact, until))
+}
+
+/// Conjugate gradients with block-Jacobi; the fastest of three times.
+pub fn block_jacobi(system: &mut System, exact: &[V], until: Until) -> Course {
+    fastest_course(3, || run(system, Solver::Jacobi, exact, until))
+}
+
+/// The same course up to this many times, with the least seconds after every iteration: other work on the machine only
+/// makes them more.
+fn fastest_course(times: usize, mut course: impl FnMut() -> Course) -> Course {
+    let mut fastest = course();
+    let long = |course: &Course| course.points.last().map_or(0.0, |point| point.0);
+    let mut total = long(&fastest);
+    for _ in 1..times {
+        if times > 3 && total > LONG_ENOUGH {
+            break;
+        }
+        let again = course();
+        total += long(&again);
+        for (known, point) in fastest.points.iter_mut().zip(again.points) {
+            known.0 = known.0.min(point.0);
+        }
+    }
+    fastest
+}
+
+/// Seconds of a step as in the paper, which are those of rotations, operators of all levels and three cycles; and those
+/// of its parts.
 pub fn step_of_three(system: &mut System, smoother: Smoother, in_gradients: bool) -> (f64, Seconds) {
     let operator_s = system.update();
     let (mut multigrid, seconds) = system.multigrid(smoother);
     let none = vec![V::zeros(); system.unknowns() / 3];
-    let three = Until { iterations: 3, error: -1.0, seconds: 0.0 };
-    let course = run(system, Solver::of(&mut multigrid, in_gradients), &none, three);
+    let course = three_cycles(system, &mut multigrid, in_gradients, &none);
     (operator_s + seconds.coarse + course.points.last().map_or(f64::NAN, |point| point.0), seconds)
 }
 
