@@ -152,10 +152,9 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
     /// Computes L from the values of `A`, whose pattern was analysed.
     pub fn factorise(&mut self, A: &BlockCsr<f64>, filter: &Filter) -> Result<(), Failure> {
         self.factored = false;
-        let (Some(symbolic), Some(scratch)) = (&self.symbolic, &mut self.scratch) else {
+        if self.symbolic.is_none() {
             return Err(Failure::Memory);
-        };
-        let n = self.right.len();
+        }
         self.held.fill(false);
         self.inclined.clear();
         for &(copy, held) in filter.held() {
@@ -174,21 +173,24 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
                 }
             }
         }
-        for column in 0..n {
-            for k in self.first[column] as usize..self.first[column + 1] as usize {
-                let Source { block, entry } = self.source[k];
-                let row = self.rows[k] as usize;
-                let value = match self.inclined.is_empty() {
-                    true => A.blocks[block as usize][entry as usize],
-                    false => {
-                        filtered(&self.inclined, &A.blocks[block as usize], [column, row, entry as usize])
-                    }
-                };
-                // A copy without mass and stiffness stays where it is.
-                let idle = self.held[row] || self.held[column] || (row == column && value == 0.0);
-                self.values[k] = T::of(if !idle { value } else { f64::from(u8::from(row == column)) });
+        if filter.held().is_empty() {
+            for (value, &Source { block, entry }) in self.values.iter_mut().zip(&self.source) {
+                *value = T::of(A.blocks[block as usize][entry as usize]);
             }
+            // A copy without mass and stiffness stays where it is. Diagonal entries are the last ones of their columns.
+            for &end in &self.first[1..] {
+                let diagonal = &mut self.values[end as usize - 1];
+                if *diagonal == T::default() {
+                    *diagonal = T::of(1.0);
+                }
+            }
+        } else {
+            self.set_filtered(A);
         }
+        let (Some(symbolic), Some(scratch)) = (&self.symbolic, &mut self.scratch) else {
+            return Err(Failure::Memory);
+        };
+        let n = self.right.len();
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, &self.first, None, &self.rows);
         symbolic
             .factorize_numeric_llt(
@@ -203,6 +205,24 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
             .map_err(|LltError::NonPositivePivot { index }| Failure::Pivot(displacement(symbolic, index)))?;
         self.factored = true;
         Ok(())
+    }
+
+    /// Sets the values of the upper triangle where some directions are held.
+    fn set_filtered(&mut self, A: &BlockCsr<f64>) {
+        for column in 0..self.right.len() {
+            for k in self.first[column] as usize..self.first[column + 1] as usize {
+                let Source { block, entry } = self.source[k];
+                let row = self.rows[k] as usize;
+                let value = match self.inclined.is_empty() {
+                    true => A.blocks[block as usize][entry as usize],
+                    false => {
+                        filtered(&self.inclined, &A.blocks[block as usize], [column, row, entry as usize])
+                    }
+                };
+                let idle = self.held[row] || self.held[column] || (row == column && value == 0.0);
+                self.values[k] = T::of(if !idle { value } else { f64::from(u8::from(row == column)) });
+            }
+        }
     }
 
     /// z = scale · (L Lᵀ)⁻¹ (r / scale), with the solve in the precision of the factor.

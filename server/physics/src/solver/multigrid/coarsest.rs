@@ -101,11 +101,15 @@ impl Coarsest {
         self.matrix.clear();
         for (id, places) in self.places.iter().enumerate() {
             let R = frames[id].to_rotation_matrix().into_inner();
-            let A = galerkin.cell_matrix(hierarchy, last, id).rotated::<Lanes>(&R);
-            for (i, &at) in places.iter().enumerate() {
-                let block = &mut self.matrix.blocks[at as usize];
-                for (e, entry) in block.iter_mut().enumerate() {
-                    *entry += f64::from(A.entry(3 * (i / 8) + e / 3, 3 * (i % 8) + e % 3));
+            let A = galerkin.cell_matrix(hierarchy, last, id).rotated::<Lanes>(&R).rows();
+            for (a, places) in places.chunks_exact(8).enumerate() {
+                for (b, &at) in places.iter().enumerate() {
+                    let block = &mut self.matrix.blocks[at as usize];
+                    for i in 0..3 {
+                        for j in 0..3 {
+                            block[3 * i + j] += f64::from(A[3 * a + i][3 * b + j]);
+                        }
+                    }
                 }
             }
         }
