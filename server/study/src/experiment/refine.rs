@@ -6,7 +6,8 @@ use nalgebra::Vector3;
 use scindo_physics::solver::multigrid::{Cycle, Multigrid, Smoother};
 use scindo_physics::solver::{Pcg, PcgSettings, StopReason};
 
-use super::system::{System, norm};
+use super::solve::LONG_ENOUGH;
+use super::system::{System, TIMES, norm};
 
 type V = Vector3<f64>;
 
@@ -28,6 +29,27 @@ pub struct Refined {
     pub solve_s: f64,
     /// Seconds of residuals in double precision.
     pub residual_s: f64,
+}
+
+/// [`refine`] several times, with the least seconds: other work on the machine only makes them more.
+pub fn refine_fastest(
+    system: &mut System,
+    mut multigrid: Option<&mut Multigrid>,
+    to: f64,
+    round: [f64; 2],
+) -> Refined {
+    let mut fastest = refine(system, multigrid.as_deref_mut(), to, round);
+    let mut total = fastest.solve_s;
+    for _ in 1..TIMES {
+        if total > LONG_ENOUGH {
+            break;
+        }
+        let again = refine(system, multigrid.as_deref_mut(), to, round);
+        total += again.solve_s;
+        fastest.solve_s = fastest.solve_s.min(again.solve_s);
+        fastest.residual_s = fastest.residual_s.min(again.residual_s);
+    }
+    fastest
 }
 
 /// Solves A u = b from u = 0 until ‖b − A u‖ ≤ `to` ‖b‖. Every round reduces the residual by conjugate gradients with

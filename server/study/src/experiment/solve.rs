@@ -72,8 +72,8 @@ impl<'a> Solver<'a> {
     }
 }
 
-/// Cycles are timed again until they have taken so long together [s].
-const LONG_ENOUGH: f64 = 3.0;
+/// Runs are not timed again once they have taken so long together [s].
+pub const LONG_ENOUGH: f64 = 3.0;
 
 /// Three cycles as in a step of the paper, from u = 0, whatever error they leave; the fastest of several times.
 pub fn three_cycles(
@@ -83,26 +83,26 @@ pub fn three_cycles(
     exact: &[V],
 ) -> Course {
     let until = Until { iterations: 3, error: -1.0, seconds: 0.0 };
-    fastest_course(TIMES, || run(system, Solver::of(multigrid, in_gradients), exact, until))
+    fastest_course((TIMES, LONG_ENOUGH), || run(system, Solver::of(multigrid, in_gradients), exact, until))
 }
 
 /// Conjugate gradients with block-Jacobi; the fastest of three times.
 pub fn block_jacobi(system: &mut System, exact: &[V], until: Until) -> Course {
-    fastest_course(3, || run(system, Solver::Jacobi, exact, until))
+    fastest_course((3, f64::INFINITY), || run(system, Solver::Jacobi, exact, until))
 }
 
-/// The same course up to this many times, with the least seconds after every iteration: other work on the machine only
-/// makes them more.
-fn fastest_course(times: usize, mut course: impl FnMut() -> Course) -> Course {
+/// A course that is run up to so many times and until it has taken so long altogether [s], with the least seconds after
+/// every iteration: other work on the machine only makes them more.
+fn fastest_course((times, enough_s): (usize, f64), mut course: impl FnMut() -> Course) -> Course {
     let mut fastest = course();
-    let long = |course: &Course| course.points.last().map_or(0.0, |point| point.0);
-    let mut total = long(&fastest);
+    let length = |course: &Course| course.points.last().map_or(0.0, |point| point.0);
+    let mut total = length(&fastest);
     for _ in 1..times {
-        if times > 3 && total > LONG_ENOUGH {
+        if total > enough_s {
             break;
         }
         let again = course();
-        total += long(&again);
+        total += length(&again);
         for (known, point) in fastest.points.iter_mut().zip(again.points) {
             known.0 = known.0.min(point.0);
         }
