@@ -114,8 +114,8 @@ fn turned<V: Vector8>(R: &[[V; 3]; 3], B: &[Lanes; 6]) -> [V; 6] {
     out
 }
 
-/// Adds the blocks of eight cells without hanging corners; that of slot 0 is the first of `B`. They differ from that of slot 0 by the signs of
-/// reflections only, so those of opposite slots are equal.
+/// Adds the blocks of eight cells without hanging corners. `B` begins with the block of slot 0. Those of other slots
+/// differ from it by the signs of reflections only, so those of opposite slots are equal.
 ///
 /// # Safety
 /// All local numbers are below the length of `rows`.
