@@ -379,7 +379,7 @@ fn skin(mesh: &TetMesh, repeats: usize) {
     let top = mesh.nodes.iter().fold(0.0_f64, |top, node| top.max(node.z));
     let run = || {
         let mut cut = CutMesh::new(mesh.clone()).expect("a block can be cut");
-        let mut skin = Skin::new(&cut, settings, &mut |p, _| *p).expect("the settings are usual");
+        let mut skin = Skin::new(&cut, settings, None, &mut |p, _| *p).expect("the settings are usual");
         let mut x = cut.rest_positions();
         let seconds = (0..100u32).map(|k| {
             let at = |s: f64| {

@@ -56,7 +56,7 @@ use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
 pub use crate::solver::multigrid::CycleShape;
 pub use crate::solver::{Method, PcgSettings, StopReason};
-use crate::space::skin::{Skin, SkinSettings, SkinShape};
+use crate::space::skin::{OwnSurface, Skin, SkinSettings, SkinShape};
 use crate::space::{Space, Tets};
 use crate::storage::reserve::{refill, resize_reserving};
 use crate::team::Team;
@@ -368,6 +368,7 @@ impl Body {
     pub fn put_on_skin(
         &mut self,
         settings: SkinSettings,
+        own: Option<&OwnSurface<'_>>,
         shape: &mut SkinShape<'_>,
     ) -> Result<(), BodyError> {
         if self.snap.is_some() {
@@ -375,7 +376,7 @@ impl Body {
             return Err(BodyError::Combination { what: "a skin", with, instead: "cutting method xfem" });
         }
         if self.space.can_carry_skin() {
-            return Ok(self.space.put_on_skin(settings, shape)?);
+            return Ok(self.space.put_on_skin(settings, own, shape)?);
         }
         Err(BodyError::Combination { what: "a skin", with: self.space.name(), instead: "tet4" })
     }

@@ -23,7 +23,7 @@ use crate::operator::cells::CellStiffness;
 use crate::operator::{StiffModes, Stiffness};
 use crate::solver::multigrid::Hierarchy;
 use crate::space::deepest::{Bounds, deepest_of};
-use crate::space::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::space::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::space::{RestPoint, Space, VisitPiece};
 use crate::team::Team;
 
@@ -400,7 +400,12 @@ impl Space for OctreeSpace {
         None
     }
 
-    fn put_on_skin(&mut self, _: SkinSettings, _: &mut SkinShape<'_>) -> Result<(), SkinError> {
+    fn put_on_skin(
+        &mut self,
+        _: SkinSettings,
+        _: Option<&OwnSurface<'_>>,
+        _: &mut SkinShape<'_>,
+    ) -> Result<(), SkinError> {
         Ok(())
     }
 

@@ -36,7 +36,7 @@ use crate::mesh::MeshError;
 use crate::octree::OctreeSpace;
 use crate::operator::{StiffModes, Stiffness};
 use crate::solver::multigrid::Hierarchy;
-use crate::space::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::space::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::storage::saved::saved_as;
 use crate::team::Team;
 
@@ -227,7 +227,12 @@ pub trait Space: Any + Points + Send + Sync {
     fn skin(&self) -> Option<&Skin>;
 
     /// Puts a skin finer than the elements on the uncut body.
-    fn put_on_skin(&mut self, settings: SkinSettings, shape: &mut SkinShape<'_>) -> Result<(), SkinError>;
+    fn put_on_skin(
+        &mut self,
+        settings: SkinSettings,
+        own: Option<&OwnSurface<'_>>,
+        shape: &mut SkinShape<'_>,
+    ) -> Result<(), SkinError>;
 
     /// See [`Skin::spoil`].
     #[doc(hidden)]

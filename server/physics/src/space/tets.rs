@@ -20,7 +20,7 @@ use crate::octree::Octree;
 use crate::operator::cells::CellStiffness;
 use crate::operator::{Elastic, StiffModes, Stiffness, degenerate_elements};
 use crate::solver::multigrid::Hierarchy;
-use crate::space::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::space::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::team::Team;
 
 /// Distance, relative to the element, by which a point is moved towards its side before its piece is looked
@@ -416,8 +416,13 @@ impl Space for Tets {
         self.skin.as_ref()
     }
 
-    fn put_on_skin(&mut self, settings: SkinSettings, shape: &mut SkinShape<'_>) -> Result<(), SkinError> {
-        self.skin = Some(Skin::new(&self.cut, settings, shape)?);
+    fn put_on_skin(
+        &mut self,
+        settings: SkinSettings,
+        own: Option<&OwnSurface<'_>>,
+        shape: &mut SkinShape<'_>,
+    ) -> Result<(), SkinError> {
+        self.skin = Some(Skin::new(&self.cut, settings, own, shape)?);
         Ok(())
     }
 

@@ -13,7 +13,7 @@ use scindo_physics::element::{Point, Points, Simd};
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, MeshError, TetMesh, box_mesh};
 use scindo_physics::operator::{Block6, Direction, ElasticUpdate, Padded, Place, StiffModes, Stiffness};
-use scindo_physics::space::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use scindo_physics::space::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use scindo_physics::space::{RestPoint, Space, Tets, VisitPiece};
 use scindo_physics::team::Team;
 
@@ -312,8 +312,13 @@ impl Space for Lattice {
         self.tets.skin()
     }
 
-    fn put_on_skin(&mut self, settings: SkinSettings, shape: &mut SkinShape<'_>) -> Result<(), SkinError> {
-        self.tets.put_on_skin(settings, shape)
+    fn put_on_skin(
+        &mut self,
+        settings: SkinSettings,
+        own: Option<&OwnSurface<'_>>,
+        shape: &mut SkinShape<'_>,
+    ) -> Result<(), SkinError> {
+        self.tets.put_on_skin(settings, own, shape)
     }
 
     fn spoil_skin(&mut self) {

@@ -1,10 +1,14 @@
 //! A skin embedded in a body, and its settings and errors.
 
+use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::base::Base;
 use super::incision_mark::lift;
 use super::misfit::Misfit;
+use super::overlay::Overlay;
+use super::own::{Kept, OwnSurface};
+use super::patch::rest_on;
 use super::sheet::{Sheet, SkinShape};
 use super::stitch::{Change, SkinJoin, SkinSource};
 use crate::cut::{CutMesh, IncisionMark, Surface};
@@ -76,12 +80,22 @@ pub struct Skin {
     surface: Surface,
     epoch: u32,
     misfit: Option<Misfit>,
+    kept: Option<Kept>,
 }
 
 impl Skin {
     /// Puts a skin on an uncut body. `shape` returns the rest position [m] of the skin for a point of the
     /// boundary [m] and its unit normal. The identity follows the boundary.
-    pub fn new(cut: &CutMesh, settings: SkinSettings, shape: &mut SkinShape<'_>) -> Result<Self, SkinError> {
+    ///
+    /// A skin with an `own` surface consists of its triangles, divided by the edges of the boundary; the divisions
+    /// in the settings do not count then. Only where the surface and the boundary do not go together the skin rests
+    /// where `shape` says.
+    pub fn new(
+        cut: &CutMesh,
+        settings: SkinSettings,
+        own: Option<&OwnSurface<'_>>,
+        shape: &mut SkinShape<'_>,
+    ) -> Result<Self, SkinError> {
         let SkinSettings { divisions, snapping } = settings;
         if !(1..=MAX_DIVISIONS).contains(&divisions) {
             return Err(SkinError::Divisions { found: divisions });
@@ -93,11 +107,20 @@ impl Skin {
             return Err(SkinError::AlreadyCut);
         }
         let base = Base::new(cut.mesh(), &cut.fragments);
-        let found = base.faces.len() * divisions * divisions;
+        let found = match own {
+            Some(own) => base.faces.len() + own.triangles.len(),
+            None => base.faces.len() * divisions * divisions,
+        };
         if found > MAX_TRIANGLES {
             return Err(SkinError::TooFine { found });
         }
-        let sheet = Sheet::new(&base, &cut.mesh().nodes, divisions, shape);
+        let (sheet, kept) = match own {
+            Some(own) => {
+                let (sheet, kept) = own_sheet(&base, &cut.mesh().nodes, own, shape);
+                (sheet, Some(kept))
+            }
+            None => (Sheet::new(&base, &cut.mesh().nodes, divisions, shape), None),
+        };
         if let Some(point) = sheet.points.iter().position(|p| !p.place.iter().all(|c| c.is_finite())) {
             return Err(SkinError::NonFinitePlace { point });
         }
@@ -110,6 +133,7 @@ impl Skin {
             surface: Surface::default(),
             epoch: cut.epoch(),
             misfit: None,
+            kept,
         };
         skin.sew_anew(cut);
         Ok(skin)
@@ -211,6 +235,11 @@ impl Skin {
         self.misfit
     }
 
+    /// How much of its own surface the skin consists of, if it has one.
+    pub fn kept(&self) -> Option<Kept> {
+        self.kept
+    }
+
     /// Number of skin triangles that the last cut renewed. All others stayed unchanged.
     pub fn renewed(&self) -> usize {
         self.join.renewed()
@@ -220,4 +249,18 @@ impl Skin {
     pub fn settings(&self) -> SkinSettings {
         self.settings
     }
+}
+
+/// A skin of the triangles of a surface, and how many of them it has.
+fn own_sheet(
+    base: &Base,
+    nodes: &[Vector3<f64>],
+    own: &OwnSurface<'_>,
+    shape: &mut SkinShape<'_>,
+) -> (Sheet, Kept) {
+    let mut sheet = Sheet::new(base, nodes, 1, &mut |flat, _| *flat);
+    let overlay = Overlay::new(base, nodes, own, &mut sheet);
+    let kept = rest_on(own, &overlay, nodes, &mut sheet, shape);
+    sheet.forget_chains();
+    (sheet, kept)
 }

@@ -9,6 +9,8 @@
 //!    its vertices become skin points, its edges chains of skin edges. Triangles are split along it or, with
 //!    `snapping`, their corners move onto it. Positions are interpolated, so splitting changes no shape.
 //!    Triangles that do not meet the curve stay as they are.
+//!    The skin of a surface with triangles of its own is [divided along their edges](overlay) instead, and
+//!    [rests on them](patch).
 //! 3. [`stitch`]: skin triangles and lips become one surface. An edge of the cut curve joins its chain of
 //!    skin edges to the fragment face of the lip, whose border corners move to the skin. Surface vertices are
 //!    cycles of corners, so the result is closed and 2-manifold by construction. Both lips of a fresh cut
@@ -22,6 +24,9 @@
 
 mod base;
 mod sheet;
+mod own;
+mod overlay;
+mod patch;
 mod insert;
 mod walk;
 mod misfit;
@@ -34,6 +39,7 @@ mod incision;
 pub use embedding::{Skin, SkinError, SkinSettings};
 pub use incision::{Penetration, incision};
 pub use misfit::Misfit;
+pub use own::{Kept, Landing, OwnSurface};
 pub use sheet::SkinShape;
 
 #[cfg(test)]

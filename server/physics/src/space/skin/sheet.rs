@@ -169,7 +169,7 @@ impl Sheet {
     }
 
     /// Area-weighted unit normals of the flat sheet.
-    fn normals(&self, nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    pub fn normals(&self, nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let mut normals = vec![Vector3::zeros(); self.points.len()];
         for corners in &self.corners {
             let [p, q, r] = corners.map(|p| flat(&self.points[p as usize].at, nodes));
@@ -286,6 +286,24 @@ impl Sheet {
             next = self.twin[(next / 3 * 3 + (next + 2) % 3) as usize];
         }
         out
+    }
+
+    /// Where point `p` lies on the boundary itself [m], without the shape of the skin.
+    pub fn flat(&self, p: u32, nodes: &[Vector3<f64>]) -> Vector3<f64> {
+        flat(&self.points[p as usize].at, nodes)
+    }
+
+    /// Forgets all chains and what points represent, except at corners of the boundary: an uncut skin that is divided
+    /// in any way.
+    pub fn forget_chains(&mut self) {
+        self.chain.fill(NONE);
+        self.chains.clear();
+        self.claims.clear();
+        self.split.clear();
+        self.points.iter_mut().for_each(|point| point.claimed = false);
+        for &corner in &self.corner_point {
+            self.points[corner as usize].claimed = true;
+        }
     }
 
     /// Adds a point and returns its number.

@@ -63,7 +63,9 @@ impl Sheet {
         self.chains.push(path);
     }
 
-    fn straight(&mut self, base: &Base, f: u32, from: u32, to: u32, snapping: f64) -> Option<Vec<u32>> {
+    /// Divides the skin along the line between two points over face `f`, and returns the points along it. None if
+    /// another chain bars the way.
+    pub fn straight(&mut self, base: &Base, f: u32, from: u32, to: u32, snapping: f64) -> Option<Vec<u32>> {
         let mut path = vec![from];
         let mut at = from;
         while at != to {

@@ -1,6 +1,7 @@
 //! Skins of any resolution on bodies cut in every way, checked from the triangle list alone.
 
 mod marks;
+mod own;
 
 use std::collections::BTreeSet;
 
@@ -25,7 +26,7 @@ impl Body {
         let cut =
             CutMesh::new(box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [cells; 3], pattern)).unwrap();
         let centre = Vector3::repeat(0.5);
-        let skin = Skin::new(&cut, settings, &mut |p, _| p + (p - centre).normalize() * bulge).unwrap();
+        let skin = Skin::new(&cut, settings, None, &mut |p, _| p + (p - centre).normalize() * bulge).unwrap();
         let x = cut.rest_positions();
         let volume = skin.surface().volume(&x);
         Self { cut, skin, x, volume }
