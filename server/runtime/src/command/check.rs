@@ -193,6 +193,11 @@ fn in_words(body: &SimBody) -> String {
     {
         words += &format!("\n    {line}");
     }
+    if let Some(kept) = body.body.skin().and_then(|skin| skin.kept()) {
+        let (triangles, of, percent) = (kept.triangles, kept.of, 100.0 * kept.area);
+        words +=
+            &format!("\n    skin: {triangles} of {of} triangles of the surface, {percent:.2} % of its area");
+    }
     words
 }
 
@@ -209,5 +214,6 @@ fn body_as_json(body: &SimBody) -> Value {
         "max_m": max_m,
         "volume_m3": body.rest_volume_m3,
         "mesh": body.health,
+        "own_triangles": body.body.skin().and_then(|skin| skin.kept()),
     })
 }

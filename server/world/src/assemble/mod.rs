@@ -184,10 +184,11 @@ impl Builder<'_> {
             let doubt = "most elements are too flat for single precision, so mixed precision is used, which is slower";
             self.warnings.push(format!("{at}.mesh: {doubt}; better-shaped elements would not need it"));
         }
-        if let Some(skin) = &spec.skin
-            && let Err(fault) = skin::put_on(&mut body, skin, &spec.mesh, self.base_dir)
-        {
-            self.findings.push((format!("{at}.skin"), fault));
+        if let Some(skin) = &spec.skin {
+            match skin::put_on(&mut body, skin, &spec.mesh, self.base_dir) {
+                Ok(doubt) => self.warnings.extend(doubt.map(|doubt| format!("{at}.skin: {doubt}"))),
+                Err(fault) => self.findings.push((format!("{at}.skin"), fault)),
+            }
         }
         let mut body = SimBody::new(&spec.id, body, health);
         if let Some(texture) = &spec.look.texture {

@@ -23,6 +23,7 @@ pub(crate) use estimate::{body_bytes, most_cells};
 pub(crate) use health::connectivity::components;
 pub use health::scale::{ScaleWarning, check_scale};
 pub use health::surface::SurfaceHealth;
+pub(crate) use health::surface::clean_surface;
 pub use health::volume::{VolumeHealth, repair_volume};
 pub use lattice::{LatticeReport, lattice_from_surface};
 pub use load::{MeshHealth, load_any, load_surface, load_volume};

@@ -27,6 +27,8 @@ use super::raw::*;
 use super::schema::{Finding, json_schema, validate};
 use super::source::Node;
 
+/// Parts of each edge of a divided skin, unless the scene says otherwise.
+const DIVISIONS: u32 = 4;
 /// Most tetrahedra a box may have; more would not fit the memory of an ordinary machine.
 const MAX_BOX_CELLS: u64 = 8_000_000;
 
@@ -160,8 +162,18 @@ impl Check<'_> {
             let next = "remove it; `scale` of the mesh applies to its skin too";
             self.conflict(format!("{at}.skin.scale"), "`scale` only goes with `surface`", next);
         }
+        let own = skin.triangles == RawSkinTriangles::Own;
+        if own && skin.divisions.is_some() {
+            let next = "remove it, or write triangles = \"divided\"";
+            self.conflict(format!("{at}.skin.divisions"), "triangles = `own` are not divided", next);
+        }
+        if own && skin.surface.is_none() && body.mesh.surface.is_none() && body.mesh.organ.is_none() {
+            let next = "add `surface` with an .obj, .stl or .ply file, or write triangles = \"divided\"";
+            let what = "the mesh was not made from a surface, so the skin has no triangles of its own";
+            self.conflict(format!("{at}.skin.triangles"), what, next);
+        }
         SkinSpec {
-            divisions: skin.divisions as usize,
+            divisions: (!own).then_some(skin.divisions.unwrap_or(DIVISIONS) as usize),
             snapping: skin.snapping,
             surface: skin.surface.clone().map(|path| (path, skin.scale.unwrap_or(1.0))),
         }

@@ -184,8 +184,8 @@ pub enum TextureMapping {
 /// A skin finer than the elements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkinSpec {
-    /// Parts of each edge of the elements' boundary.
-    pub divisions: usize,
+    /// Parts of each edge of the elements' boundary; none: the skin consists of the triangles of the surface.
+    pub divisions: Option<usize>,
     /// Share of an edge from which a corner is moved onto a cut.
     pub snapping: f64,
     /// Surface it rests on as path and metres per length unit; none: the one the mesh was made from.

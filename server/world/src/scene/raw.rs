@@ -313,12 +313,15 @@ pub struct RawOrgan {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawSkin {
+    /// Which triangles the skin consists of.
+    #[serde(default)]
+    pub triangles: RawSkinTriangles,
     /// Number n of parts into which each edge of the elements' boundary is divided. Each face then has n²
-    /// skin triangles.
-    #[serde(default = "four")]
+    /// skin triangles. Default: 4.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 32), extend("x-next" = "2 to 6 looks smooth; the number of triangles grows \
         with the square"))]
-    pub divisions: u32,
+    pub divisions: Option<u32>,
     /// File of the surface that the skin follows: .obj, .stl or .ply, relative to the scene file. Default:
     /// the surface that the mesh was made from; without one, the boundary of the elements.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -335,8 +338,16 @@ pub struct RawSkin {
     pub snapping: f64,
 }
 
-fn four() -> u32 {
-    4
+/// Triangles of a skin.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawSkinTriangles {
+    /// The faces of the elements' boundary, divided. They follow the surface.
+    #[default]
+    Divided,
+    /// Those of the surface, so that its shape and its texture coordinates are exact. Faces of the elements divide
+    /// them further. Where the elements are too coarse for the surface, the skin follows it as a divided one does.
+    Own,
 }
 
 /// A region of a body that is held or displaced.
