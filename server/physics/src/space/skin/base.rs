@@ -85,6 +85,26 @@ impl Base {
         self.face_at[at..at + 4].iter().copied().filter(|&f| f != NONE)
     }
 
+    /// The two faces at each edge.
+    pub fn across(&self) -> Vec<[u32; 2]> {
+        let mut across = vec![[NONE; 2]; self.n_edges];
+        for (f, face) in (0u32..).zip(&self.faces) {
+            for (&edge, &forward) in face.edges.iter().zip(&face.forward) {
+                across[edge as usize][usize::from(forward)] = f;
+            }
+        }
+        across
+    }
+
+    /// The faces at each corner.
+    pub fn faces_at_corners(&self) -> Vec<Vec<u32>> {
+        let mut faces = vec![Vec::new(); self.n_corners];
+        for (f, face) in (0u32..).zip(&self.faces) {
+            face.corners.iter().for_each(|&corner| faces[corner as usize].push(f));
+        }
+        faces
+    }
+
     /// The boundary face that contains the face of fragment `t` opposite its vertex `face`, if that face is
     /// part of the skin.
     pub fn under(&self, mesh: &TetMesh, fragments: &Fragments, t: u32, face: usize) -> Option<u32> {

@@ -16,7 +16,7 @@ use crate::cut::topology::fragments::{FragmentVertex, NONE};
 pub const ON: f64 = 1e-9;
 
 /// Share below which two vertices are the same point, e.g. one crossing on both lips of an older cut.
-const SAME: f64 = 1e-12;
+pub const SAME: f64 = 1e-12;
 
 /// Where a new point is inserted.
 enum Spot {

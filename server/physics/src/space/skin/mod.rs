@@ -25,6 +25,7 @@
 mod base;
 mod sheet;
 mod own;
+mod pen;
 mod overlay;
 mod patch;
 mod insert;

@@ -277,6 +277,30 @@ impl Sheet {
         self.link(3 * third + 1, 3 * t + 2);
     }
 
+    /// Turns the edge of half-edge `h`, so that it joins the other two corners of its triangles. They keep their numbers;
+    /// the edge becomes the last half-edge of each.
+    pub fn flip(&mut self, h: u32) {
+        let g = self.twin[h as usize];
+        let (t, s) = (h / 3, g / 3);
+        let after = |h: u32, steps: u32| h / 3 * 3 + (h + steps) % 3;
+        let (u, v) = (self.from(h), self.to(h));
+        let (p, q) = (self.from(after(h, 2)), self.from(after(g, 2)));
+        let outer = [after(h, 2), after(g, 1), after(g, 2), after(h, 1)];
+        let (twins, chains) = (outer.map(|h| self.twin[h as usize]), outer.map(|h| self.chain[h as usize]));
+        self.corners[t as usize] = [p, u, q];
+        self.corners[s as usize] = [q, v, p];
+        let inner = [3 * t, 3 * t + 1, 3 * s, 3 * s + 1];
+        for ((h, twin), chain) in inner.into_iter().zip(twins).zip(chains) {
+            // Two of the outer sides may be each other's opposite.
+            let twin = outer.iter().position(|h| *h == twin).map_or(twin, |k| inner[k]);
+            self.link(h, twin);
+            self.chain[h as usize] = chain;
+        }
+        self.link(3 * t + 2, 3 * s + 2);
+        self.chain[3 * t as usize + 2] = NONE;
+        self.chain[3 * s as usize + 2] = NONE;
+    }
+
     /// All half-edges that leave the first point of `h`.
     pub fn around(&self, h: u32) -> Vec<u32> {
         let mut out = vec![h];

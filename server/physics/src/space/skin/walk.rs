@@ -63,9 +63,7 @@ impl Sheet {
         self.chains.push(path);
     }
 
-    /// Divides the skin along the line between two points over face `f`, and returns the points along it. None if
-    /// another chain bars the way.
-    pub fn straight(&mut self, base: &Base, f: u32, from: u32, to: u32, snapping: f64) -> Option<Vec<u32>> {
+    fn straight(&mut self, base: &Base, f: u32, from: u32, to: u32, snapping: f64) -> Option<Vec<u32>> {
         let mut path = vec![from];
         let mut at = from;
         while at != to {
