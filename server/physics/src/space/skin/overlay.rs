@@ -172,6 +172,10 @@ impl Map<'_> {
             crossings.push(Crossing { face, side, share });
             let [a, b] = self.across[self.base.faces[face as usize].edges[side] as usize];
             face = if a == face { b } else { a };
+            // Around a corner in the plane, whose neighbours are all on one side, the way comes back without a length.
+            if face == start {
+                return None;
+            }
         }
         Some(Way { crossings, end: face })
     }
