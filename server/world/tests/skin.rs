@@ -142,35 +142,6 @@ fn own_triangles_need_a_surface_and_no_divisions() {
 }
 
 #[test]
-#[ignore]
-fn look() {
-    for organ in ["kidney", "liver", "vessel", "diaphragm", "tendon", "brain", "fingertip"] {
-        for cells in [8, 14, 24, 40] {
-            let organ_mesh = format!("mesh = {{ organ = {{ shape = \"{organ}\", cells = {cells} }} }}");
-            let text = ORGAN
-                .replace("mesh = { organ = { cells = 10 } }", &organ_mesh)
-                .replace("divisions = 4", "divisions = 1");
-            let scene = Scene::from_toml(&text).unwrap();
-            let begin = std::time::Instant::now();
-            let Ok(sim) = Simulation::new(&scene, Path::new("")) else { continue };
-            let plain = begin.elapsed();
-            let faces = sim.bodies()[0].body.surface().triangles.len();
-            let begin = std::time::Instant::now();
-            let sim = start(&text.replace("divisions = 1", "triangles = \"own\""));
-            let body = &sim.bodies()[0].body;
-            let kept = body.skin().unwrap().kept().unwrap();
-            println!(
-                "{organ} {cells}: own {} faces {faces} shown {} kept {:.4} {:?} - {plain:?}",
-                kept.of,
-                body.surface().triangles.len(),
-                kept.area,
-                begin.elapsed()
-            );
-        }
-    }
-}
-
-#[test]
 fn a_skin_on_quadratic_elements_is_refused() {
     let text = ORGAN.replace("skin =", "element = \"tet10\"\nskin =");
     let error = Scene::from_toml(&text).unwrap_err().to_string();

@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::f64::consts::{PI, TAU};
 use std::fs;
 
+use nalgebra::Vector3;
 use scindo_world::inputs::{Inputs, Wants};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
@@ -64,6 +66,7 @@ const HEX: &str = "mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], 
     element = \"hex8\"";
 const LATTICE: &str = "mesh = { surface = \"cube.obj\", cells = 8 }";
 const SKIN: &str = "mesh = { surface = \"cube.obj\", cells = 8 }\nskin = { divisions = 3 }";
+const OWN: &str = "mesh = { surface = \"cube.obj\", cells = 8 }\nskin = { triangles = \"own\" }";
 const OCTREE: &str =
     "mesh = { surface = \"cube.obj\", cells = 12 }\nelement = \"octree\"\nlaw = \"corotational\"";
 
@@ -88,9 +91,14 @@ fn the_image_lies_where_it_belongs_on_every_mesh_and_stays_there_when_it_is_cut(
     let folder = folder();
     let own = "image = \"skin.png\"";
     let given = "image = \"skin.png\", surface = \"cube.obj\"";
-    for (body, texture, bound) in
-        [(BOX, given, 1e-5), (HEX, given, 1e-5), (LATTICE, own, 1e-5), (SKIN, own, 1e-5), (OCTREE, own, 0.02)]
-    {
+    for (body, texture, bound) in [
+        (BOX, given, 1e-5),
+        (HEX, given, 1e-5),
+        (LATTICE, own, 1e-5),
+        (SKIN, own, 1e-5),
+        (OWN, own, 1e-5),
+        (OCTREE, own, 0.02),
+    ] {
         let mut simulation = Simulation::new(&scene(body, texture), folder.path()).unwrap();
         let before = shown(&mut simulation);
         assert!(before.topology.tags.iter().all(|tag| *tag == 0), "{body}");
@@ -104,6 +112,109 @@ fn the_image_lies_where_it_belongs_on_every_mesh_and_stays_there_when_it_is_cut(
         }
         assert!(error(&after) < bound, "{body}, cut: {}", error(&after));
     }
+}
+
+/// A ball whose image is a map of the world: u = longitude with a seam at 0, v = latitude with a pole at each end.
+struct Globe {
+    corners: Vec<[Vector3<f64>; 3]>,
+    coordinates: Vec<[[f64; 2]; 3]>,
+}
+
+impl Globe {
+    fn new(around: usize, up: usize) -> Self {
+        let mut globe = Self { corners: Vec::new(), coordinates: Vec::new() };
+        let at = |i: usize, j: usize| {
+            let (u, v) = (i as f64 / around as f64, j as f64 / up as f64);
+            let (longitude, latitude) = (TAU * (i % around) as f64 / around as f64, PI * (v - 0.5));
+            let flat = if j % up == 0 { 0.0 } else { latitude.cos() };
+            let x = Vector3::new(flat * longitude.cos(), flat * longitude.sin(), latitude.sin());
+            (0.5 * SIDE * (x + Vector3::repeat(1.0)), [u, v])
+        };
+        for (i, j) in (0..around).flat_map(|i| (0..up).map(move |j| (i, j))) {
+            let [p, q, r, s] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            let mut add = |three: [(Vector3<f64>, [f64; 2]); 3]| {
+                globe.corners.push(three.map(|(x, _)| x));
+                globe.coordinates.push(three.map(|(_, uv)| uv));
+            };
+            if j > 0 {
+                add([p, q, r]);
+            }
+            if j + 1 < up {
+                add([p, r, s]);
+            }
+        }
+        globe
+    }
+
+    fn obj(&self) -> String {
+        let mut text = String::new();
+        for (x, [u, v]) in self.corners.iter().flatten().zip(self.coordinates.iter().flatten()) {
+            text += &format!("v {} {} {}\nvt {u} {v}\n", x.x, x.y, x.z);
+        }
+        for t in 0..self.corners.len() {
+            let [a, b, c] = [1, 2, 3].map(|k| 3 * t + k);
+            text += &format!("f {a}/{a} {b}/{b} {c}/{c}\n");
+        }
+        text
+    }
+
+    /// Furthest that a corner of the skin lies from its place on the image, and off the surface [m].
+    fn errors(&self, body: &BodySnapshot) -> [f64; 2] {
+        let found = body.topology.on_image(body.texture.as_ref().unwrap());
+        let triangles = body.topology.triangles.iter().zip(&body.topology.tags).filter(|(_, tag)| **tag == 0);
+        let mut errors = [0.0_f64; 2];
+        for ((triangle, _), on) in triangles.zip(found) {
+            let x = triangle.map(|v| Vector3::from(body.topology.rest[v as usize].map(f64::from)));
+            let centre = (x[0] + x[1] + x[2]) / 3.0;
+            let weights = |t: usize, x: &Vector3<f64>| {
+                let [a, b, c] = self.corners[t];
+                let n = (b - a).cross(&(c - a));
+                let part =
+                    |p: Vector3<f64>, q: Vector3<f64>| (p - x).cross(&(q - x)).dot(&n) / n.norm_squared();
+                ([part(b, c), part(c, a), part(a, b)], (x - a).dot(&n.normalize()).abs())
+            };
+            // The triangle of the globe that the centre is in.
+            let inside = |&t: &usize| {
+                let (w, off) = weights(t, &centre);
+                w.iter().copied().fold(f64::INFINITY, f64::min) - off / SIDE
+            };
+            let t = (0..self.corners.len()).max_by(|s, t| inside(s).total_cmp(&inside(t))).unwrap();
+            for (x, on) in x.iter().zip(on) {
+                let (w, off) = weights(t, x);
+                let exact = [0, 1].map(|k| (0..3).map(|c| w[c] * self.coordinates[t][c][k]).sum::<f64>());
+                let away = (0..2).map(|k| (exact[k] - f64::from(on[k])).abs()).fold(0.0, f64::max);
+                errors = [errors[0].max(away), errors[1].max(off)];
+            }
+        }
+        errors
+    }
+}
+
+#[test]
+fn a_skin_of_own_triangles_shows_the_image_exactly_even_beside_a_seam() {
+    let globe = Globe::new(20, 10);
+    let folder = folder();
+    fs::write(folder.path().join("globe.obj"), globe.obj()).unwrap();
+    let mesh = "mesh = { surface = \"globe.obj\", cells = 8 }\n";
+    let own = format!("{mesh}skin = {{ triangles = \"own\" }}");
+    let mut simulation = Simulation::new(&scene(&own, "image = \"skin.png\""), folder.path()).unwrap();
+    let kept = simulation.bodies()[0].body.skin().unwrap().kept().unwrap();
+    assert_eq!(kept.triangles, 20 * 2 * 9);
+    assert_eq!(kept.of, kept.triangles);
+    let [image, shape] = globe.errors(&shown(&mut simulation));
+    assert!(image < 1e-5 && shape < 1e-8, "{image} of the image, {shape} m");
+    for _ in 0..5 {
+        simulation.step(&Inputs::default());
+    }
+    let after = shown(&mut simulation);
+    assert!(after.topology.tags.iter().any(|tag| *tag != 0), "it is cut");
+    let [image, shape] = globe.errors(&after);
+    assert!(image < 1e-5 && shape < 1e-8, "{image} of the image, {shape} m, cut");
+    // A divided skin only comes near.
+    let divided = format!("{mesh}skin = {{ divisions = 2 }}");
+    let mut simulation = Simulation::new(&scene(&divided, "image = \"skin.png\""), folder.path()).unwrap();
+    let [image, shape] = globe.errors(&shown(&mut simulation));
+    assert!(image > 1e-3 && shape > 1e-5, "{image} of the image, {shape} m");
 }
 
 #[test]

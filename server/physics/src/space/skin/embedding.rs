@@ -45,7 +45,7 @@ pub enum SkinError {
     },
     /// The skin would have too many triangles.
     #[error(
-        "the skin would have {found} triangles, at most {MAX_TRIANGLES} are allowed; use fewer divisions"
+        "the skin would have {found} triangles, at most {MAX_TRIANGLES} are allowed; use fewer divisions or a coarser surface"
     )]
     TooFine {
         /// Number requested.
@@ -121,6 +121,10 @@ impl Skin {
             }
             None => (Sheet::new(&base, &cut.mesh().nodes, divisions, shape), None),
         };
+        let found = sheet.corners.len();
+        if found > MAX_TRIANGLES {
+            return Err(SkinError::TooFine { found });
+        }
         if let Some(point) = sheet.points.iter().position(|p| !p.place.iter().all(|c| c.is_finite())) {
             return Err(SkinError::NonFinitePlace { point });
         }

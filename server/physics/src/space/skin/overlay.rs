@@ -2,7 +2,8 @@
 //!
 //! Every vertex of the surface becomes a skin point where it lands. Every edge goes from one of them to the other in
 //! the plane that holds both and the normal of the surface, over as many boundary faces as lie between them. Where it
-//! would meet another edge, the boundary is folded as seen from the surface, and the edge is left out.
+//! would meet another edge, the boundary is folded as seen from the surface. Such an edge goes between the others at the
+//! end, on any way that is free, or is left out.
 //!
 //! # Source
 //! Jiao, Heath 2004, "Overlaying surface meshes, part I: algorithms": the common refinement of two surfaces.
@@ -38,13 +39,20 @@ impl Overlay {
         let landed = land(&map, &mut pen, own.landings);
         let edges = own.edges();
         pen.sheet.chains = vec![Vec::new(); edges.len()];
+        let mut left_out = Vec::new();
         for (number, edge) in (0u32..).zip(&edges) {
             let [Some(from), Some(to)] = edge.ends.map(|v| landed[v as usize].as_ref()) else { continue };
             let up = edge.beside.iter().flatten().map(|&t| own.area_normal(t)).sum();
             let [a, b] = edge.ends.map(|v| own.vertices[v as usize]);
-            if let Some(parts) =
-                map.way([from, to], &up, (b - a).norm()).and_then(|way| draw(&mut pen, [from, to], &way))
-            {
+            let way = map.way([from, to], &up, (b - a).norm());
+            match way.and_then(|way| draw(&mut pen, [from, to], &way)) {
+                Some(parts) => pen.mark(number, &parts),
+                None => left_out.push((number, [from.point, to.point])),
+            }
+        }
+        // What the others leave between them is room enough in most places.
+        for (number, [from, to]) in left_out {
+            if let Some(parts) = pen.lead(from, to) {
                 pen.mark(number, &parts);
             }
         }

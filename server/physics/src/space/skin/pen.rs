@@ -6,7 +6,7 @@
 //! # Source
 //! Sloan 1993, "A fast algorithm for generating constrained Delaunay triangulations", section 4.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 use nalgebra::Vector3;
 
@@ -14,6 +14,9 @@ use super::base::Base;
 use super::insert::{SAME, Target};
 use super::sheet::Sheet;
 use crate::cut::topology::fragments::{FragmentVertex, NONE};
+
+/// Most edges that a way through triangles crosses. Longer ones go around something.
+const LONGEST: usize = 16;
 
 /// A part of a path over one boundary face, between two points that an edge of the skin joins.
 #[derive(Clone, Copy)]
@@ -183,6 +186,59 @@ impl<'a> Pen<'a> {
             }
         }
         self.half_edge(f, ends[0], ends[1]).is_some()
+    }
+
+    /// Joins two points by the shortest way through triangles that crosses no path, and returns its parts. None if there is
+    /// none nearby. Points on sides are not looked for by [`Pen::point_on_side`] afterwards.
+    pub fn lead(&mut self, from: u32, to: u32) -> Option<Vec<Part>> {
+        let crossed = self.between(from, to)?;
+        let mut parts = Vec::with_capacity(crossed.len() + 1);
+        let mut last = from;
+        for (face, [a, b]) in crossed {
+            let [u, v] = [a, b].map(|point| self.sheet.points[point as usize].at);
+            let h = self.half_edge(face, a, b)?;
+            let new = self.sheet.corners.len() as u32;
+            let divided = [h / 3, self.sheet.twin[h as usize] / 3, new, new + 1];
+            let point = self.sheet.add_point(FragmentVertex::between(&u, &v, 0.5), Vector3::zeros(), true);
+            self.sheet.split_edge(h, point);
+            divided.into_iter().for_each(|t| self.renew(t));
+            parts.push(Part { face, ends: [last, point] });
+            last = point;
+        }
+        let h = self.fan(last).find(|&h| self.sheet.to(h) == to)?;
+        parts.push(Part { face: self.sheet.face[h as usize / 3], ends: [last, to] });
+        self.is_free(&parts).then_some(parts)
+    }
+
+    /// The edges that [`Pen::lead`] crosses, each with the face on the near side of it.
+    fn between(&self, from: u32, to: u32) -> Option<Vec<(u32, [u32; 2])>> {
+        let sheet = &*self.sheet;
+        if self.fan(from).any(|h| sheet.to(h) == to && sheet.chain[h as usize] == NONE) {
+            return Some(Vec::new());
+        }
+        // Half-edges that are crossed, each with its predecessor in the list and their number up to there.
+        let mut crossed: Vec<(u32, usize, usize)> = Vec::new();
+        let mut seen = BTreeSet::new();
+        let free = |h: &u32| sheet.chain[*h as usize] == NONE;
+        crossed.extend(self.fan(from).map(following).filter(free).map(|h| (h, usize::MAX, 1)));
+        let mut next = 0;
+        while let Some(&(h, _, number)) = crossed.get(next) {
+            let g = sheet.twin[h as usize];
+            if sheet.to(following(g)) == to {
+                let step = |&at: &usize| Some(crossed[at].1).filter(|at| *at != usize::MAX);
+                let way = std::iter::successors(Some(next), step).map(|at| crossed[at].0);
+                let way = way.map(|h| (sheet.face[h as usize / 3], [sheet.from(h), sheet.to(h)]));
+                let mut way: Vec<_> = way.collect();
+                way.reverse();
+                return Some(way);
+            }
+            if number < LONGEST && seen.insert(g / 3) {
+                let further = [following(g), previous(g)].into_iter().filter(free);
+                crossed.extend(further.map(|h| (h, next, number + 1)));
+            }
+            next += 1;
+        }
+        None
     }
 
     /// Whether a path passes no point of another path, nor one of its own points twice, and runs along no other.
