@@ -12,14 +12,16 @@ const MAX_BYTES: u64 = 16 << 20;
 /// Most pixels along a side; older graphics cards take no more.
 const MAX_PIXELS: usize = 8192;
 
-/// The texture of a body whose mesh comes from `source`; paths are relative to `base_dir`. The fault comes with its key.
+/// The texture of a body whose mesh comes from `source`; paths are relative to `base_dir`. Its skin is `worn` if it consists
+/// of triangles of a surface. The fault comes with its key.
 pub fn load(
     spec: &TextureSpec,
     source: &MeshSource,
+    worn: bool,
     base_dir: &Path,
 ) -> Result<Texture, (&'static str, Fault)> {
     let image = image(&base_dir.join(&spec.image)).map_err(|fault| ("image", fault))?;
-    let mapping = mapping(&spec.mapping, source, base_dir).map_err(|fault| ("surface", fault))?;
+    let mapping = mapping(&spec.mapping, source, worn, base_dir).map_err(|fault| ("surface", fault))?;
     Ok(Texture::new(image, mapping))
 }
 
@@ -53,7 +55,12 @@ fn image(path: &Path) -> Result<Image, Fault> {
     Ok(Image { media_type, bytes: bytes.into() })
 }
 
-fn mapping(mapping: &TextureMapping, source: &MeshSource, base_dir: &Path) -> Result<Mapping, Fault> {
+fn mapping(
+    mapping: &TextureMapping,
+    source: &MeshSource,
+    worn: bool,
+    base_dir: &Path,
+) -> Result<Mapping, Fault> {
     let (path, scale) = match (mapping, source) {
         (TextureMapping::Axes(repeat_m), _) => return Ok(Mapping::Axes { repeat_m: *repeat_m }),
         (TextureMapping::Surface(Some((path, scale))), _) => (path, *scale),
@@ -67,5 +74,5 @@ fn mapping(mapping: &TextureMapping, source: &MeshSource, base_dir: &Path) -> Re
     };
     let surface = read_textured(&base_dir.join(path)).map_err(fault)?;
     let atlas = Atlas::new(&surface, scale).map_err(|error| Fault::Mesh { reason: error.to_string() })?;
-    Ok(Mapping::Atlas(Box::new(atlas)))
+    Ok(Mapping::Atlas(Box::new(if worn { atlas.worn() } else { atlas })))
 }

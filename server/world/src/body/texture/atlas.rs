@@ -22,6 +22,8 @@ const SEAM: u32 = u32::MAX;
 /// How far coordinates of one corner may lie from those that another corner's triangle extrapolates, relative to their
 /// distance. Larger differences are looked at more closely.
 const BENT: f64 = 0.5;
+/// How far points in single precision may lie off a triangle that they are on, relative to their coordinates.
+const SINGLE: f64 = 1e-6;
 /// Most triangles around a centre that are looked at.
 const MOST: usize = 4096;
 
@@ -41,6 +43,8 @@ pub struct Atlas {
     /// Across every side of every triangle, from its first corner on: the triangle whose coordinates go on there, or
     /// [`SEAM`].
     across: Vec<[u32; 3]>,
+    /// Whether the skin consists of parts of its triangles.
+    worn: bool,
 }
 
 impl Atlas {
@@ -57,7 +61,13 @@ impl Atlas {
         let corners = surface.triangles.iter().map(|triangle| triangle.map(point)).collect();
         let bits = |v: u32| positions[v as usize].map(f32::to_bits);
         let across = across(surface, bits);
-        Ok(Self { tree, corners, coordinates: surface.coordinates.clone(), across })
+        Ok(Self { tree, corners, coordinates: surface.coordinates.clone(), across, worn: false })
+    }
+
+    /// The same surface for a skin that consists of parts of its triangles. Every part that lies on one triangle has
+    /// exactly the coordinates of that.
+    pub fn worn(self) -> Self {
+        Self { worn: true, ..self }
     }
 
     /// The place closest to a point [m].
@@ -75,6 +85,9 @@ impl Atlas {
         if places[0].triangle == SEAM {
             return Corners::default();
         }
+        if let Some(corners) = self.worn.then(|| self.on_one(&x, &places)).flatten() {
+            return corners;
+        }
         if self.goes_on(&x, &places) {
             return places.map(|place| place.at);
         }
@@ -83,6 +96,46 @@ impl Atlas {
         let around = self.around(self.place(centre).triangle, centre, radius);
         let among = || around.iter().map(|&triangle| (0.0, triangle));
         x.map(|x| self.place_of(self.tree.closest_point_among(x, f64::MAX, among())).at)
+    }
+
+    /// Texture coordinates on the triangle that all of these corners [m] lie on, if there is one.
+    fn on_one(&self, x: &[V; 3], places: &[Place; 3]) -> Option<Corners> {
+        let [first, ..] = places;
+        if places.iter().all(|place| place.triangle == first.triangle) {
+            return Some(places.map(|place| place.at));
+        }
+        let beside = |place: &Place| {
+            let across = self.across[place.triangle as usize];
+            [place.triangle, across[0], across[1], across[2]]
+        };
+        let near = places.iter().flat_map(beside).filter(|t| *t != SEAM);
+        let at_centre = || self.place((x[0] + x[1] + x[2]) / 3.0).triangle;
+        near.chain(std::iter::once_with(at_centre)).find_map(|t| self.all_on(t, x))
+    }
+
+    /// Texture coordinates of points [m] if all of them lie on triangle `t`, as far as single precision can tell.
+    fn all_on(&self, t: u32, x: &[V; 3]) -> Option<Corners> {
+        let corners = self.corners[t as usize];
+        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+        let size = corners.iter().chain(x).map(|x| x.amax()).fold(0.0, f64::max);
+        let (allowed, twice) = (SINGLE * size, normal.norm());
+        let mut found = Corners::default();
+        for (x, found) in x.iter().zip(&mut found) {
+            let mut weights = [0.0; 3];
+            for k in 0..3 {
+                let [p, q] = [1, 2].map(|i| corners[(k + i) % 3]);
+                let part = (p - x).cross(&(q - x)).dot(&normal) / twice;
+                if part < -allowed * (q - p).norm() {
+                    return None;
+                }
+                weights[k] = part / twice;
+            }
+            if (x - corners[0]).dot(&normal).abs() > allowed * twice {
+                return None;
+            }
+            *found = self.at(t, weights);
+        }
+        Some(found)
     }
 
     /// Whether the places of the other corners are where the triangle of the first one extrapolates them to.
