@@ -142,6 +142,43 @@ fn own_triangles_need_a_surface_and_no_divisions() {
 }
 
 #[test]
+fn a_torn_and_crumpled_surface_still_makes_a_closed_skin() {
+    let surface = Organ::Kidney.surface();
+    let mut random = 1_u64;
+    let mut next = || {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 33) as f64 / 2_f64.powi(31)
+    };
+    let mut text = String::new();
+    for v in &surface.vertices {
+        let off = [next(), next(), next()].map(|r| 4e-4 * (r - 0.5));
+        text += &format!("v {} {} {}\n", v.x + off[0], v.y + off[1], v.z + off[2]);
+    }
+    for [a, b, c] in surface.triangles.iter().map(|t| t.map(|v| v + 1)) {
+        match (20.0 * next()) as usize {
+            0 => {}                                                  // a hole
+            1 => text += &format!("f {a} {c} {b}\n"),                // inside out
+            2 => text += &format!("f {a} {b} {c}\nf {b} {c} {a}\n"), // twice
+            _ => text += &format!("f {a} {b} {c}\n"),
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("torn.obj"), text).unwrap();
+    let scene = ORGAN
+        .replace("{ organ = { cells = 10 } }", "{ surface = \"torn.obj\", cells = 16 }")
+        .replace("divisions = 4", "triangles = \"own\"");
+    let mut sim = Simulation::new(&Scene::from_toml(&scene).unwrap(), folder.path()).unwrap();
+    let kept = sim.bodies()[0].body.skin().unwrap().kept().unwrap();
+    assert!(kept.area > 0.6 && kept.area < 1.0, "{kept:?}");
+    let uncut = volume(&snapshot(&mut sim));
+    for _ in 0..4 {
+        sim.step(&Inputs::default());
+    }
+    assert!(sim.bodies()[0].body.skin().unwrap().fits());
+    assert!((volume(&snapshot(&mut sim)) / uncut - 1.0).abs() < 0.02);
+}
+
+#[test]
 fn a_skin_on_quadratic_elements_is_refused() {
     let text = ORGAN.replace("skin =", "element = \"tet10\"\nskin =");
     let error = Scene::from_toml(&text).unwrap_err().to_string();

@@ -313,7 +313,7 @@ pub struct RawOrgan {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawSkin {
-    /// Which triangles the skin consists of.
+    /// Which triangles the skin consists of: the faces of the elements' boundary, `divided`, or the surface's `own`.
     #[serde(default)]
     pub triangles: RawSkinTriangles,
     /// Number n of parts into which each edge of the elements' boundary is divided. Each face then has n²
