@@ -144,9 +144,10 @@ fn a_skin_consists_of_the_triangles_of_its_surface() {
 
 #[test]
 fn random_sweeps_cut_skins_of_their_own_triangles() {
-    for (seed, snapping) in (0..8u64).flat_map(|s| [(s, 0.0), (s, 0.25)]) {
+    for (seed, snapping) in (0..24u64).flat_map(|s| [(s, 0.0), (s, 0.25)]) {
         let mut random = Random(seed);
-        let surface = Surface::new(2 + (seed % 4) as usize, 0.3, 0.02, &mut random);
+        let bulge = if seed % 3 == 0 { 0.0 } else { 0.02 };
+        let surface = Surface::new(2 + (seed % 4) as usize, 0.3, bulge, &mut random);
         let (mut body, kept) = surface.worn(2, BoxPattern::Tet6, SkinSettings { divisions: 4, snapping });
         assert_eq!(kept.triangles, kept.of);
         for incision in 1..=6 {
@@ -154,7 +155,7 @@ fn random_sweeps_cut_skins_of_their_own_triangles() {
             let b = a + random.vector(0.9);
             let step = random.vector(0.9);
             body.sweep(&[[a, b], [a + step, b + step]], incision);
-            body.check(if snapping == 0.0 { 1e-10 } else { 0.02 });
+            body.check(if bulge == 0.0 && snapping == 0.0 { 1e-10 } else { 0.02 });
         }
     }
 }
