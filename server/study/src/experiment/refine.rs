@@ -13,6 +13,8 @@ type V = Vector3<f64>;
 
 /// The residual of the converged solution over that at the start.
 const CONVERGED: f64 = 1e-9;
+/// What the last round aims at, over what is asked for: its norm is that of the preconditioner.
+const LAST: f64 = 0.6;
 /// Most rounds of a refinement.
 const ROUNDS: usize = 12;
 
@@ -82,7 +84,7 @@ pub fn refine(
         change.fill([0.0; 4]);
         let (mut A, jacobi, team) = system.parts();
         // The last round need not do more than is asked for.
-        let tolerance = round[0].max(0.3 * to / refined.left);
+        let tolerance = round[0].max(LAST * to / refined.left);
         let settings = PcgSettings { iterations: round[1] as u32, tolerance };
         let report = match &mut multigrid {
             Some(multigrid) => {
