@@ -2,8 +2,8 @@
 //!
 //! The edges of an [`Overlay`] divide the skin into patches. A patch whose border is that of one triangle becomes it.
 //! Points on its border rest on the edges, and points inside it at a weighted mean of their neighbours. With
-//! positive weights and a convex border no part of the triangle is turned over, and mean value weights change the shape
-//! of these parts least. All other patches are places where surface and boundary do not go together; their points rest
+//! positive weights and a convex border no part of the triangle is turned over; with mean value weights the parts keep
+//! their shape where the boundary is flat. All other patches are places where surface and boundary do not go together; their points rest
 //! where those of a skin without triangles of its own do.
 //!
 //! # Source
@@ -26,7 +26,7 @@ const TURNED: f64 = 1e-12;
 /// Part of the skin between edges of a surface.
 struct Patch {
     triangles: Vec<u32>,
-    /// Sides on edges of the surface, counter-clockwise around the patch in no order.
+    /// Its half-edges along edges of the surface, in no order.
     border: Vec<u32>,
 }
 
@@ -113,7 +113,8 @@ fn patches(sheet: &Sheet) -> Vec<Patch> {
     patches
 }
 
-/// The triangle that lies on the inner side of the whole border, if the patch is a disk around which that is one.
+/// The triangle of the surface whose edges are the whole border of the patch, seen from inside. None if the border belongs
+/// to several, or the patch is no disk.
 fn owner(patch: &Patch, overlay: &Overlay, sheet: &Sheet) -> Option<u32> {
     let beside = |&h: &u32| {
         let number = sheet.chain[h as usize] as usize;
