@@ -3,8 +3,8 @@
 //! The edges of an [`Overlay`] divide the skin into patches. A patch whose border is that of one triangle becomes it.
 //! Points on its border rest on the edges, and points inside it at a weighted mean of their neighbours. With
 //! positive weights and a convex border no part of the triangle is turned over; with mean value weights the parts keep
-//! their shape where the boundary is flat. All other patches are places where surface and boundary do not go together; their points rest
-//! where those of a skin without triangles of its own do.
+//! their shape where the boundary is flat. All other patches are places where surface and boundary do not go together;
+//! their points rest where those of a skin without triangles of its own do.
 //!
 //! # Source
 //! Tutte 1963, "How to draw a graph"; Floater 2003, "Mean value coordinates", eq. 2.1.
