@@ -126,7 +126,7 @@ impl Globe {
         let at = |i: usize, j: usize| {
             let (u, v) = (i as f64 / around as f64, j as f64 / up as f64);
             let (longitude, latitude) = (TAU * (i % around) as f64 / around as f64, PI * (v - 0.5));
-            let flat = if j % up == 0 { 0.0 } else { latitude.cos() };
+            let flat = if j == 0 || j == up { 0.0 } else { latitude.cos() };
             let x = Vector3::new(flat * longitude.cos(), flat * longitude.sin(), latitude.sin());
             (0.5 * SIDE * (x + Vector3::repeat(1.0)), [u, v])
         };

@@ -189,7 +189,7 @@ impl<'a> Pen<'a> {
     }
 
     /// Joins two points by the shortest way through triangles that crosses no path, and returns its parts. None if there is
-    /// none nearby. Points on sides are not looked for by [`Pen::point_on_side`] afterwards.
+    /// none nearby. [`Pen::point_on_side`] does not know the points that it makes.
     pub fn lead(&mut self, from: u32, to: u32) -> Option<Vec<Part>> {
         let crossed = self.between(from, to)?;
         let mut parts = Vec::with_capacity(crossed.len() + 1);
