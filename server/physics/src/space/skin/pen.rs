@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 use super::base::Base;
 use super::insert::{SAME, Target};
-use super::sheet::Sheet;
+use super::sheet::{Sheet, following, previous};
 use crate::cut::topology::fragments::{FragmentVertex, NONE};
 
 /// Most edges that a way through triangles crosses. Longer ones go around something.
@@ -91,11 +91,7 @@ impl<'a> Pen<'a> {
         let [a, b] = [face.nodes[k], face.nodes[(k + 1) % 3]].map(FragmentVertex::at_node);
         let at = FragmentVertex::between(&a, &b, share);
         let on_path = self.sheet.chain[h as usize] != NONE;
-        let new = self.sheet.corners.len() as u32;
-        let divided = [h / 3, self.sheet.twin[h as usize] / 3, new, new + 1];
-        let point = self.sheet.add_point(at, Vector3::zeros(), true);
-        self.sheet.split_edge(h, point);
-        divided.into_iter().for_each(|t| self.renew(t));
+        let point = self.divide(h, at);
         self.used[point as usize] = on_path;
         self.on_side[face.edges[k] as usize].insert(place, (along, point));
         point
@@ -197,11 +193,7 @@ impl<'a> Pen<'a> {
         for (face, [a, b]) in crossed {
             let [u, v] = [a, b].map(|point| self.sheet.points[point as usize].at);
             let h = self.half_edge(face, a, b)?;
-            let new = self.sheet.corners.len() as u32;
-            let divided = [h / 3, self.sheet.twin[h as usize] / 3, new, new + 1];
-            let point = self.sheet.add_point(FragmentVertex::between(&u, &v, 0.5), Vector3::zeros(), true);
-            self.sheet.split_edge(h, point);
-            divided.into_iter().for_each(|t| self.renew(t));
+            let point = self.divide(h, FragmentVertex::between(&u, &v, 0.5));
             parts.push(Part { face, ends: [last, point] });
             last = point;
         }
@@ -275,9 +267,17 @@ impl<'a> Pen<'a> {
 
     /// All half-edges that leave a point.
     fn fan(&self, point: u32) -> impl Iterator<Item = u32> {
-        let first = self.leaving[point as usize];
-        let next = move |&h: &u32| Some(self.sheet.twin[previous(h) as usize]).filter(|h| *h != first);
-        std::iter::successors(Some(first), next)
+        self.sheet.fan(self.leaving[point as usize])
+    }
+
+    /// Divides the edge of half-edge `h` at a new point.
+    fn divide(&mut self, h: u32, at: FragmentVertex) -> u32 {
+        let new = self.sheet.corners.len() as u32;
+        let divided = [h / 3, self.sheet.twin[h as usize] / 3, new, new + 1];
+        let point = self.sheet.add_point(at, Vector3::zeros(), true);
+        self.sheet.split_edge(h, point);
+        divided.into_iter().for_each(|t| self.renew(t));
+        point
     }
 
     /// Takes the corners of a triangle that is new or was changed.
@@ -287,14 +287,4 @@ impl<'a> Pen<'a> {
         self.used.resize(points, false);
         (3 * t..3 * t + 3).for_each(|h| self.leaving[self.sheet.from(h) as usize] = h);
     }
-}
-
-/// The next half-edge around the same triangle.
-fn following(h: u32) -> u32 {
-    h / 3 * 3 + (h + 1) % 3
-}
-
-/// The previous half-edge around the same triangle.
-fn previous(h: u32) -> u32 {
-    h / 3 * 3 + (h + 2) % 3
 }

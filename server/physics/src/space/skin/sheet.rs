@@ -282,10 +282,9 @@ impl Sheet {
     pub fn flip(&mut self, h: u32) {
         let g = self.twin[h as usize];
         let (t, s) = (h / 3, g / 3);
-        let after = |h: u32, steps: u32| h / 3 * 3 + (h + steps) % 3;
         let (u, v) = (self.from(h), self.to(h));
-        let (p, q) = (self.from(after(h, 2)), self.from(after(g, 2)));
-        let outer = [after(h, 2), after(g, 1), after(g, 2), after(h, 1)];
+        let outer = [previous(h), following(g), previous(g), following(h)];
+        let (p, q) = (self.from(outer[0]), self.from(outer[2]));
         let (twins, chains) = (outer.map(|h| self.twin[h as usize]), outer.map(|h| self.chain[h as usize]));
         self.corners[t as usize] = [p, u, q];
         self.corners[s as usize] = [q, v, p];
@@ -303,13 +302,13 @@ impl Sheet {
 
     /// All half-edges that leave the first point of `h`.
     pub fn around(&self, h: u32) -> Vec<u32> {
-        let mut out = vec![h];
-        let mut next = self.twin[(h / 3 * 3 + (h + 2) % 3) as usize];
-        while next != h && out.len() <= self.corners.len() {
-            out.push(next);
-            next = self.twin[(next / 3 * 3 + (next + 2) % 3) as usize];
-        }
-        out
+        self.fan(h).take(self.corners.len() + 1).collect()
+    }
+
+    /// The same, one after the other.
+    pub fn fan(&self, h: u32) -> impl Iterator<Item = u32> {
+        let next = move |&g: &u32| Some(self.twin[previous(g) as usize]).filter(|g| *g != h);
+        std::iter::successors(Some(h), next)
     }
 
     /// Where point `p` lies on the boundary itself [m], without the shape of the skin.
@@ -335,6 +334,16 @@ impl Sheet {
         self.points.push(Point { at, place, claimed });
         self.points.len() as u32 - 1
     }
+}
+
+/// The next half-edge around the same triangle.
+pub fn following(h: u32) -> u32 {
+    h / 3 * 3 + (h + 1) % 3
+}
+
+/// The previous half-edge around the same triangle.
+pub fn previous(h: u32) -> u32 {
+    h / 3 * 3 + (h + 2) % 3
 }
 
 /// The point on the boundary itself [m], without the shape of the skin.
