@@ -123,16 +123,65 @@ fn a_skin_of_own_triangles_has_the_shape_of_its_surface() {
 }
 
 #[test]
+fn cells_wear_the_triangles_of_their_surface_too() {
+    let surface = Organ::Kidney.surface();
+    let text = ORGAN
+        .replace("{ organ = { cells = 10 } }", "{ organ = { shape = \"kidney\", cells = 28 } }")
+        .replace(
+            "{ divisions = 4 }",
+            "{ triangles = \"own\" }\nelement = \"octree\"\nsolver = { method = \"mg-pcg\" }",
+        );
+    let mut sim = start(&text);
+    assert!(sim.warnings().is_empty(), "{:?}", sim.warnings());
+    let kept = sim.bodies()[0].body.kept().unwrap();
+    assert_eq!(kept.of, surface.triangles.len());
+    assert!(kept.area > 0.99 && kept.area < 1.0 + 1e-9, "{kept:?}");
+    let uncut = snapshot(&mut sim);
+    let exact = surface_volume(&surface);
+    assert!((volume(&uncut) / exact - 1.0).abs() < 2e-4, "{} instead of {exact}", volume(&uncut));
+    for _ in 0..4 {
+        sim.step(&Inputs::default());
+    }
+    let cut = snapshot(&mut sim);
+    let [before, after] = [&uncut, &cut].map(|shown| &shown.bodies[0].topology);
+    assert!(after.tags.contains(&1));
+    assert!((volume(&cut) / volume(&uncut) - 1.0).abs() < 0.01);
+    // Beside the cut the skin is that of the cells.
+    let corners = |t: &[u32; 3], rest: &[[f32; 3]]| {
+        let mut x = t.map(|v| rest[v as usize].map(f32::to_bits));
+        x.sort_unstable();
+        x
+    };
+    let shown: BTreeSet<_> = after.triangles.iter().map(|t| corners(t, &after.rest)).collect();
+    let stayed = before.triangles.iter().filter(|t| shown.contains(&corners(t, &before.rest))).count();
+    let share = stayed as f64 / before.triangles.len() as f64;
+    assert!(share > 0.8 && share < 0.99, "{share} of the skin stayed");
+    // It comes back with an earlier state, and with the whole body.
+    let state = sim.checkpoint().unwrap();
+    sim.reset().unwrap();
+    assert_eq!(snapshot(&mut sim).bodies[0].topology.triangles, uncut.bodies[0].topology.triangles);
+    sim.restore(&state).unwrap();
+    let again = snapshot(&mut sim);
+    assert_eq!(again.bodies[0].topology.triangles, cut.bodies[0].topology.triangles);
+    assert_eq!(again.bodies[0].positions, cut.bodies[0].positions);
+}
+
+#[test]
 fn own_triangles_need_a_surface_and_no_divisions() {
     let own = ORGAN.replace("divisions = 4", "triangles = \"own\"");
     let cube = "{ box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [2, 2, 2] } }";
     for (text, key) in [
         (own.replace("{ organ = { cells = 10 } }", cube), "body.organ.skin.triangles"),
         (own.replace("\"own\"", "\"own\", divisions = 2"), "body.organ.skin.divisions"),
+        (ORGAN.replace("skin =", "element = \"octree\"\nskin ="), "body.organ.skin"),
     ] {
         let error = Scene::from_toml(&text).unwrap_err().to_string();
-        assert!(error.contains(key) && error.contains("divided"), "{error}");
+        assert!(error.contains(key) && (error.contains("divided") || error.contains("own")), "{error}");
     }
+    let snapped =
+        own.replace("\"own\"", "\"own\", snapping = 0.2").replace("skin =", "element = \"octree\"\nskin =");
+    let error = Scene::from_toml(&snapped).unwrap_err().to_string();
+    assert!(error.contains("body.organ.skin.snapping"), "{error}");
     // Elements far coarser than the surface keep only a part of it, and the scene says so.
     let coarse = own.replace("cells = 10", "shape = \"brain\", cells = 8");
     let mut sim = start(&coarse);

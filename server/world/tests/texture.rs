@@ -210,6 +210,12 @@ fn a_skin_of_own_triangles_shows_the_image_exactly_even_beside_a_seam() {
     assert!(after.topology.tags.iter().any(|tag| *tag != 0), "it is cut");
     let [image, shape] = globe.errors(&after);
     assert!(image < 1e-5 && shape < 1e-8, "{image} of the image, {shape} m, cut");
+    // So does one on cells.
+    let cells = format!("{own}\nelement = \"octree\"");
+    let mut simulation = Simulation::new(&scene(&cells, "image = \"skin.png\""), folder.path()).unwrap();
+    assert_eq!(simulation.bodies()[0].body.kept().unwrap().triangles, kept.of);
+    let [image, shape] = globe.errors(&shown(&mut simulation));
+    assert!(image < 1e-5 && shape < 1e-8, "{image} of the image, {shape} m, on cells");
     // A divided skin only comes near.
     let divided = format!("{mesh}skin = {{ divisions = 2 }}");
     let mut simulation = Simulation::new(&scene(&divided, "image = \"skin.png\""), folder.path()).unwrap();

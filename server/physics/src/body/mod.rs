@@ -56,7 +56,7 @@ use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
 pub use crate::solver::multigrid::CycleShape;
 pub use crate::solver::{Method, PcgSettings, StopReason};
-use crate::space::skin::{OwnSurface, Skin, SkinSettings, SkinShape};
+use crate::space::skin::{Kept, OwnSurface, Skin, SkinSettings, SkinShape};
 use crate::space::{Space, Tets};
 use crate::storage::reserve::{refill, resize_reserving};
 use crate::team::Team;
@@ -375,10 +375,21 @@ impl Body {
             let with = "cutting that changes the mesh";
             return Err(BodyError::Combination { what: "a skin", with, instead: "cutting method xfem" });
         }
-        if self.space.can_carry_skin() {
+        if self.space.can_carry_skin(own.is_some()) {
             return Ok(self.space.put_on_skin(settings, own, shape)?);
         }
-        Err(BodyError::Combination { what: "a skin", with: self.space.name(), instead: "tet4" })
+        let what = if own.is_some() { "a skin" } else { "a divided skin" };
+        Err(BodyError::Combination { what, with: self.space.name(), instead: "tet4" })
+    }
+
+    /// What a skin of triangles of its own lies on; see [`Space::skin_ground`].
+    pub fn skin_ground(&self) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+        self.space.skin_ground()
+    }
+
+    /// How much of its own surface the skin consists of, if it has one.
+    pub fn kept(&self) -> Option<Kept> {
+        self.space.kept()
     }
 
     /// The skin, if the body has one.

@@ -28,6 +28,9 @@ impl OctreeSpace {
             self.epoch += 1;
             self.octree.follow_volumes(&change, &mut self.volumes);
             self.surface.follow(&self.octree, &self.changed, &[]);
+            if let Some(own) = &mut self.own {
+                own.follow(&self.octree, &self.surface, &self.changed);
+            }
         }
         OctreeRefinement { change, new_copies }
     }
@@ -74,6 +77,9 @@ impl OctreeSpace {
         self.only_cut = false;
         self.volumes = self.octree.vertex_volumes();
         self.surface.follow_coarsening(&self.octree, &change);
+        if let Some(own) = &mut self.own {
+            own.follow_coarsening(&self.octree, &self.surface, &change);
+        }
         change
     }
 }

@@ -10,7 +10,7 @@ use super::blade::swept_box;
 use super::cells::Octree;
 use super::change::OctreeChange;
 use super::link_map::{CutLink, LinkKey};
-use super::surface::OctreeSurface;
+use super::surface::{OctreeSurface, OwnSkin};
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{
     BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Solid, Surface,
@@ -23,7 +23,7 @@ use crate::operator::cells::CellStiffness;
 use crate::operator::{StiffModes, Stiffness};
 use crate::solver::multigrid::Hierarchy;
 use crate::space::deepest::{Bounds, deepest_of};
-use crate::space::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
+use crate::space::skin::{Kept, OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::space::{RestPoint, Space, VisitPiece};
 use crate::team::Team;
 
@@ -58,6 +58,8 @@ pub struct OctreeSpace {
     pub(super) only_cut: bool,
     pub(super) fronts: BTreeMap<u32, Front>,
     pub(super) surface: OctreeSurface,
+    /// The skin of the triangles of a surface, if the body has one.
+    pub(super) own: Option<OwnSkin>,
     pub(super) epoch: u32,
     under_way: Option<(Vec<(LinkKey, CutLink)>, CutReport)>,
 }
@@ -75,6 +77,7 @@ impl OctreeSpace {
             only_cut: false,
             fronts: BTreeMap::new(),
             surface: OctreeSurface::default(),
+            own: None,
             epoch: 0,
             under_way: None,
         };
@@ -96,6 +99,9 @@ impl OctreeSpace {
     fn renew(&mut self) {
         self.volumes = self.octree.vertex_volumes();
         self.surface = OctreeSurface::build(&self.octree);
+        if let Some(own) = &mut self.own {
+            own.begin_anew(&self.octree, &self.surface);
+        }
     }
 
     /// Remembers the last position of the blade by the material around it. `leaves` are all near the box `swept`.
@@ -199,7 +205,7 @@ impl OctreeSpace {
         let known = self.octree.n_vertices() as u32;
         let change = self.octree.cut(cuts);
         let new_copies = self.number_copies(known, &change);
-        let Self { octree, volumes, surface, .. } = self;
+        let Self { octree, volumes, surface, own, .. } = self;
         let mut follow_volumes = || {
             if change.links > 0 || change.divided > 0 {
                 octree.follow_volumes(&change, volumes);
@@ -210,6 +216,7 @@ impl OctreeSpace {
         let mut follow_surface = || {
             if shows {
                 surface.follow(octree, &change.cells, &change.moved);
+                own.iter_mut().for_each(|own| own.follow(octree, surface, &change.cells));
             }
         };
         team.run(&mut [&mut follow_volumes, &mut follow_surface]);
@@ -245,8 +252,12 @@ impl Space for OctreeSpace {
         true
     }
 
-    fn can_carry_skin(&self) -> bool {
-        false
+    fn can_carry_skin(&self, own: bool) -> bool {
+        own
+    }
+
+    fn skin_ground(&self) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+        (self.surface.rest().to_vec(), self.surface.ground())
     }
 
     fn octree(&self) -> Option<&OctreeSpace> {
@@ -370,7 +381,7 @@ impl Space for OctreeSpace {
         let total: f64 = (0..self.octree.cells().len()).map(|id| self.octree.cell_volume(id)).sum();
         let copies: f64 = self.volumes.iter().sum();
         Flaws {
-            surface: self.surface.surface().n_defects(),
+            surface: self.surface().n_defects(),
             volume: (copies / total - 1.0).abs(),
             ..Flaws::default()
         }
@@ -385,7 +396,7 @@ impl Space for OctreeSpace {
     }
 
     fn surface(&self) -> &Surface {
-        self.surface.surface()
+        self.own.as_ref().map_or(self.surface.surface(), OwnSkin::surface)
     }
 
     fn element_surface(&self) -> &Surface {
@@ -400,12 +411,21 @@ impl Space for OctreeSpace {
         None
     }
 
+    fn kept(&self) -> Option<Kept> {
+        self.own.as_ref().map(OwnSkin::kept)
+    }
+
     fn put_on_skin(
         &mut self,
         _: SkinSettings,
-        _: Option<&OwnSurface<'_>>,
-        _: &mut SkinShape<'_>,
+        own: Option<&OwnSurface<'_>>,
+        shape: &mut SkinShape<'_>,
     ) -> Result<(), SkinError> {
+        let Some(own) = own else { return Ok(()) };
+        if !self.octree.links.is_empty() {
+            return Err(SkinError::AlreadyCut);
+        }
+        self.own = Some(OwnSkin::new(&self.octree, &self.surface, own, shape)?);
         Ok(())
     }
 
@@ -474,10 +494,11 @@ impl Space for OctreeSpace {
     }
 
     fn bytes(&self) -> usize {
+        let own = self.own.as_ref().map_or(0, |own| own.surface().triangles.len());
         // The uncut state is shared.
         self.octree.bytes()
             + 16 * self.node_of_copy.len()
-            + TRIANGLE_BYTES * self.surface.surface().triangles.len()
+            + TRIANGLE_BYTES * (self.surface.surface().triangles.len() + own)
     }
 
     fn stiffness(&self, simd: Simd) -> Option<Box<dyn Stiffness>> {

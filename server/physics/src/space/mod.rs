@@ -36,7 +36,7 @@ use crate::mesh::MeshError;
 use crate::octree::OctreeSpace;
 use crate::operator::{StiffModes, Stiffness};
 use crate::solver::multigrid::Hierarchy;
-use crate::space::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
+use crate::space::skin::{Kept, OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::storage::saved::saved_as;
 use crate::team::Team;
 
@@ -65,8 +65,14 @@ pub trait Space: Any + Points + Send + Sync {
     /// Whether [`cut`](Self::cut) and [`begin_cut`](Self::begin_cut) open it.
     fn can_be_cut(&self) -> bool;
 
-    /// Whether [`put_on_skin`](Self::put_on_skin) can give it a skin.
-    fn can_carry_skin(&self) -> bool;
+    /// Whether [`put_on_skin`](Self::put_on_skin) can give it a skin, of triangles of its `own` or divided.
+    fn can_carry_skin(&self, own: bool) -> bool;
+
+    /// What a skin of triangles of its own lies on, of the uncut body: vertices [m] and triangles, counter-clockwise seen
+    /// from outside. Empty if it can have none.
+    fn skin_ground(&self) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+        Default::default()
+    }
 
     /// The tetrahedra with their mesh and pieces, if it consists of them.
     fn tets(&self) -> Option<&Tets> {
@@ -225,6 +231,11 @@ pub trait Space: Any + Points + Send + Sync {
 
     /// The skin, if there is one.
     fn skin(&self) -> Option<&Skin>;
+
+    /// How much of its own surface the skin consists of, if it has one.
+    fn kept(&self) -> Option<Kept> {
+        self.skin().and_then(Skin::kept)
+    }
 
     /// Puts a skin finer than the elements on the uncut body.
     fn put_on_skin(

@@ -206,8 +206,13 @@ impl Space for Tets {
         self.pieces_are_elements()
     }
 
-    fn can_carry_skin(&self) -> bool {
+    fn can_carry_skin(&self, _own: bool) -> bool {
         self.is_linear()
+    }
+
+    fn skin_ground(&self) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
+        let mesh = self.mesh();
+        (mesh.nodes.clone(), mesh.boundary_faces().iter().map(|face| face.nodes).collect())
     }
 
     fn tets(&self) -> Option<&Tets> {

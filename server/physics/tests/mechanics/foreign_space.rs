@@ -196,8 +196,8 @@ impl Space for Lattice {
         self.tets.can_be_cut()
     }
 
-    fn can_carry_skin(&self) -> bool {
-        self.tets.can_carry_skin()
+    fn can_carry_skin(&self, own: bool) -> bool {
+        self.tets.can_carry_skin(own)
     }
 
     fn tets(&self) -> Option<&Tets> {

@@ -193,7 +193,7 @@ fn in_words(body: &SimBody) -> String {
     {
         words += &format!("\n    {line}");
     }
-    if let Some(kept) = body.body.skin().and_then(|skin| skin.kept()) {
+    if let Some(kept) = body.body.kept() {
         let (triangles, of, percent) = (kept.triangles, kept.of, 100.0 * kept.area);
         words +=
             &format!("\n    skin: {triangles} of {of} triangles of the surface, {percent:.2} % of its area");
@@ -214,6 +214,6 @@ fn body_as_json(body: &SimBody) -> Value {
         "max_m": max_m,
         "volume_m3": body.rest_volume_m3,
         "mesh": body.health,
-        "own_triangles": body.body.skin().and_then(|skin| skin.kept()),
+        "own_triangles": body.body.kept(),
     })
 }

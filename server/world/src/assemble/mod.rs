@@ -21,7 +21,6 @@ use scindo_physics::material::{Material, MaterialError, Rayleigh, Regions};
 use scindo_physics::mesh::HexMesh;
 use scindo_physics::octree::OctreeSpace;
 use scindo_physics::space::Tets;
-use scindo_physics::space::skin::Skin;
 use scindo_physics::team::Lead;
 
 use crate::body::{Adaptation, Probe, SimBody, region};
@@ -193,7 +192,7 @@ impl Builder<'_> {
         }
         let mut body = SimBody::new(&spec.id, body, health);
         if let Some(texture) = &spec.look.texture {
-            let worn = body.body.skin().and_then(Skin::kept).is_some();
+            let worn = body.body.kept().is_some();
             match texture::load(texture, &spec.mesh, worn, self.base_dir) {
                 Ok(texture) => body.texture = Some(texture.into()),
                 Err((key, fault)) => self.findings.push((format!("{at}.look.texture.{key}"), fault)),

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use scindo_collision::SurfaceBvh;
 use scindo_physics::body::Body;
 use scindo_physics::space::Tets;
-use scindo_physics::space::skin::{Kept, Landing, OwnSurface, Skin, SkinSettings};
+use scindo_physics::space::skin::{Kept, Landing, OwnSurface, SkinSettings};
 
 use super::mesh::fault;
 use crate::format::{MeshFile, SurfaceMesh, read_mesh};
@@ -44,7 +44,7 @@ pub fn put_on(
     let landings = own.landings(body, reach)?;
     let own = OwnSurface { vertices: &own.vertices, triangles: &own.triangles, landings: &landings };
     body.put_on_skin(settings, Some(&own), shape).map_err(refused)?;
-    Ok(body.skin().and_then(Skin::kept).and_then(|kept| doubt(&kept)))
+    Ok(body.kept().and_then(|kept| doubt(&kept)))
 }
 
 fn doubt(kept: &Kept) -> Option<String> {
@@ -85,9 +85,8 @@ impl Own {
 
     /// Closest points of the body's elements to the vertices, on faces that look the same way, no farther than `reach` [m].
     fn landings(&self, body: &Body, reach: f64) -> Result<Vec<Option<Landing>>, Fault> {
-        let Some(mesh) = body.tets().map(Tets::mesh) else { return Ok(vec![None; self.vertices.len()]) };
-        let faces: Vec<[u32; 3]> = mesh.boundary_faces().iter().map(|face| face.nodes).collect();
-        let tree = tree(mesh.nodes.iter().copied(), &faces)?;
+        let (nodes, faces) = body.skin_ground();
+        let tree = tree(nodes.into_iter(), &faces)?;
         let mut normals = vec![Vector3::zeros(); self.vertices.len()];
         for corners in &self.triangles {
             let [a, b, c] = corners.map(|v| self.vertices[v as usize]);
@@ -114,9 +113,9 @@ fn rest(surface: &SurfaceBvh, flat: &Vector3<f64>, normal: &Vector3<f64>, reach:
     facing.map_or(*flat, |c| c.point)
 }
 
-/// Mean edge of the tetrahedra [m]; 0 for a body without them, which gets no skin.
+/// Mean longest edge of the tetrahedra, or diagonal of the finest cells [m].
 fn edge(body: &Body) -> f64 {
-    let Some(mesh) = body.tets().map(Tets::mesh) else { return 0.0 };
+    let Some(mesh) = body.tets().map(Tets::mesh) else { return 3_f64.sqrt() * body.element_size() };
     let sum: f64 = (0..mesh.tets.len()).map(|e| mesh.longest_edge(e)).sum();
     sum / mesh.tets.len() as f64
 }

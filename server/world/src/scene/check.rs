@@ -154,15 +154,29 @@ impl Check<'_> {
             );
             self.conflict(format!("{at}.skin"), what, next);
         }
-        if body.element != RawElement::Tet4 {
-            let next = "write element = \"tet4\", or remove the skin";
-            self.conflict(format!("{at}.skin"), "a skin needs linear tetrahedra", next);
+        let own = skin.triangles == RawSkinTriangles::Own;
+        match body.element {
+            RawElement::Tet4 => {}
+            RawElement::Octree if own => {
+                if skin.snapping != 0.0 {
+                    let what = "a skin of cells is not moved onto cuts";
+                    self.conflict(format!("{at}.skin.snapping"), what, "remove it");
+                }
+            }
+            RawElement::Octree => {
+                let next = "write triangles = \"own\", or remove the skin";
+                let what = "the surface of cells has no faces of elements to divide";
+                self.conflict(format!("{at}.skin"), what, next);
+            }
+            _ => {
+                let next = "write element = \"tet4\", or remove the skin";
+                self.conflict(format!("{at}.skin"), "a skin needs linear tetrahedra or cells", next);
+            }
         }
         if skin.scale.is_some() && skin.surface.is_none() {
             let next = "remove it; `scale` of the mesh applies to its skin too";
             self.conflict(format!("{at}.skin.scale"), "`scale` only goes with `surface`", next);
         }
-        let own = skin.triangles == RawSkinTriangles::Own;
         if own && skin.divisions.is_some() {
             let next = "remove it, or write triangles = \"divided\"";
             self.conflict(format!("{at}.skin.divisions"), "triangles = `own` are not divided", next);

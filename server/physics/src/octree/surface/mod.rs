@@ -19,6 +19,7 @@
 //! incisions near their crossing.
 
 mod links;
+mod own;
 mod patches;
 mod place;
 mod triangles;
@@ -31,6 +32,7 @@ use super::lattice::{DIRECTIONS, OUTSIDE};
 use super::link_map::LinkKey;
 use crate::cut::Surface;
 use links::partner;
+pub use own::OwnSkin;
 use patches::{Patches, Vertices};
 use place::{Crossing, place};
 

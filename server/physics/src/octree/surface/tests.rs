@@ -6,10 +6,10 @@ use super::super::*;
 use super::*;
 
 /// Random numbers in 0 … 1, the same on every run.
-struct Random(u64);
+pub(super) struct Random(pub u64);
 
 impl Random {
-    fn next(&mut self) -> f64 {
+    pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f64 / f64::from(1 << 24)
     }
@@ -18,7 +18,7 @@ impl Random {
         Vector3::new(self.next(), self.next(), self.next())
     }
 
-    fn direction(&mut self) -> Vector3<f64> {
+    pub fn direction(&mut self) -> Vector3<f64> {
         loop {
             let v = self.vector() - Vector3::repeat(0.5);
             if (0.1..0.5).contains(&v.norm()) {
@@ -28,7 +28,7 @@ impl Random {
     }
 }
 
-struct Ball(f64);
+pub(super) struct Ball(pub f64);
 
 impl Shape for Ball {
     fn bounds(&self) -> [Vector3<f64>; 2] {
@@ -73,15 +73,15 @@ fn volume(octree: &Octree) -> f64 {
 
 /// A plane through `at` across `normal`, within `radius` of `at` [m].
 #[derive(Clone, Copy)]
-struct Disc {
-    at: Vector3<f64>,
-    normal: Vector3<f64>,
-    radius: f64,
+pub(super) struct Disc {
+    pub at: Vector3<f64>,
+    pub normal: Vector3<f64>,
+    pub radius: f64,
 }
 
 impl Disc {
     /// The links that it crosses and that nothing has cut.
-    fn links(&self, octree: &Octree, incision: u32) -> Vec<(LinkKey, CutLink)> {
+    pub fn links(&self, octree: &Octree, incision: u32) -> Vec<(LinkKey, CutLink)> {
         let lattice = octree.lattice();
         let mut found = Vec::new();
         let [nx, ny, nz] = lattice.size.map(|n| n as i32);
@@ -111,7 +111,7 @@ impl Disc {
 }
 
 /// Triangles by position and tag, each from its smallest corner on.
-fn triangles(octree: &Octree, surface: &Surface) -> BTreeSet<([[u64; 3]; 3], u32)> {
+pub(super) fn triangles(octree: &Octree, surface: &Surface) -> BTreeSet<([[u64; 3]; 3], u32)> {
     let rest = octree.rest_positions();
     let at: Vec<[u64; 3]> = surface
         .vertices
@@ -137,6 +137,11 @@ fn check(octree: &Octree, whole: &OctreeSurface) {
     for (at, point) in whole.rest.iter().zip(&surface.vertices) {
         assert!((at - point.position(&rest)).norm() < 1e-12 * (1.0 + at.norm()));
     }
+    check_parts(octree, surface);
+}
+
+/// Every triangle is carried by one part.
+pub(super) fn check_parts(octree: &Octree, surface: &Surface) {
     let components = octree.components();
     let mut of_vertex = vec![u32::MAX; octree.n_vertices()];
     for (id, vertices) in octree.vertices().iter().enumerate() {

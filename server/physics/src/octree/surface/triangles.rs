@@ -142,13 +142,24 @@ impl OctreeSurface {
     }
 
     /// Opposite of half-edge 3·triangle + k.
-    fn triangle_twin(&self, h: u32) -> u32 {
+    pub(super) fn triangle_twin(&self, h: u32) -> u32 {
         let (t, k) = (h / 3, h % 3);
         if k == 2 {
             return 3 * (t ^ 1) + 2;
         }
+        self.in_triangle(self.patches.twin(self.corner(h)))
+    }
+
+    /// Corner 4·quad + k at the first end of half-edge 3·triangle + k.
+    pub(super) fn corner(&self, h: u32) -> u32 {
+        let (t, k) = (h / 3, h % 3);
         let s = u32::from(self.turned[t as usize / 2]);
-        self.in_triangle(self.patches.twin(t / 2 * 4 + (s + 2 * (t % 2) + k) % 4))
+        t / 2 * 4 + (s + 2 * (t % 2) + k) % 4
+    }
+
+    /// One half-edge 3·triangle + k of each doubled edge.
+    pub(super) fn doubled_half_edges(&self) -> impl Iterator<Item = u32> {
+        self.doubled.edges.iter().map(|&name| self.half_edge(name))
     }
 
     /// Looks around every vertex of these quads for different edges with the same two ends.
@@ -179,16 +190,9 @@ impl OctreeSurface {
     /// Ends a change: divides doubled edges in the middle and their triangles into fans.
     pub(super) fn divide_doubled_edges(&mut self, octree: &Octree) {
         let mut doubled = DoubledEdges::default();
-        for &name in &self.doubled.edges {
-            doubled.insert(self.half_edge(name));
-        }
+        self.doubled_half_edges().for_each(|h| doubled.insert(h));
         let mut surface = std::mem::take(&mut self.surface);
-        let rest = |corner: u32| {
-            let (t, k) = (corner / 3, corner % 3);
-            let s = u32::from(self.turned[t as usize / 2]);
-            let vertex = self.patches.vertex(t / 2 * 4 + (s + 2 * (t % 2) + k) % 4);
-            self.rest[vertex as usize]
-        };
+        let rest = |corner: u32| self.rest[self.patches.vertex(self.corner(corner)) as usize];
         doubled.divide(
             &mut surface,
             |h| self.triangle_twin(h),

@@ -3,10 +3,10 @@
 use crate::cut::topology::fragments::{Fragments, NONE};
 use crate::mesh::{TET_FACES, TetMesh};
 
-/// One boundary face of the uncut mesh.
+/// One boundary face of the uncut body.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct BaseFace {
-    /// Element it belongs to.
+    /// Element it belongs to, or [`NONE`] if the boundary is a surface of its own.
     pub element: u32,
     /// Its nodes, counter-clockwise seen from outside.
     pub nodes: [u32; 3],
@@ -58,25 +58,44 @@ impl Base {
             3 * base.face_at[4 * far as usize + slot] as usize + edge
         };
         let twin: Vec<usize> = (0..3 * base.faces.len()).map(beside).collect();
+        base.join(&twin);
+        base
+    }
+
+    /// Any closed surface. `twin` is the opposite of half-edge 3·face + k, which runs from corner k to the next.
+    pub fn of_surface(triangles: &[[u32; 3]], twin: &[usize]) -> Self {
+        let face = |&nodes: &[u32; 3]| BaseFace {
+            element: NONE,
+            nodes,
+            edges: [NONE; 3],
+            forward: [true; 3],
+            corners: [NONE; 3],
+        };
+        let mut base = Self { faces: triangles.iter().map(face).collect(), ..Self::default() };
+        base.join(twin);
+        base
+    }
+
+    /// Numbers edges and corners.
+    fn join(&mut self, twin: &[usize]) {
         for h in 0..twin.len() {
-            if base.faces[h / 3].edges[h % 3] == NONE {
+            if self.faces[h / 3].edges[h % 3] == NONE {
                 for (half, forward) in [(h, true), (twin[h], false)] {
-                    base.faces[half / 3].edges[half % 3] = base.n_edges as u32;
-                    base.faces[half / 3].forward[half % 3] = forward;
+                    self.faces[half / 3].edges[half % 3] = self.n_edges as u32;
+                    self.faces[half / 3].forward[half % 3] = forward;
                 }
-                base.n_edges += 1;
+                self.n_edges += 1;
             }
             // A corner is shared by all faces of one fan; the walk numbers the whole fan.
             let mut corner = h;
-            if base.faces[h / 3].corners[h % 3] == NONE {
-                while base.faces[corner / 3].corners[corner % 3] == NONE {
-                    base.faces[corner / 3].corners[corner % 3] = base.n_corners as u32;
+            if self.faces[h / 3].corners[h % 3] == NONE {
+                while self.faces[corner / 3].corners[corner % 3] == NONE {
+                    self.faces[corner / 3].corners[corner % 3] = self.n_corners as u32;
                     corner = twin[corner / 3 * 3 + (corner + 2) % 3];
                 }
-                base.n_corners += 1;
+                self.n_corners += 1;
             }
         }
-        base
     }
 
     /// Boundary faces of element `e`.

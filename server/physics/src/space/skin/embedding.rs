@@ -1,22 +1,14 @@
-//! A skin embedded in a body, and its settings and errors.
-
-use nalgebra::Vector3;
-use thiserror::Error;
+//! A skin embedded in a body, and its settings.
 
 use super::base::Base;
+use super::error::{MAX_DIVISIONS, SkinError, check, check_size};
 use super::incision_mark::lift;
+use super::laid::own_sheet;
 use super::misfit::Misfit;
-use super::overlay::Overlay;
 use super::own::{Kept, OwnSurface};
-use super::patch::rest_on;
 use super::sheet::{Sheet, SkinShape};
 use super::stitch::{Change, SkinJoin, SkinSource};
 use crate::cut::{CutMesh, IncisionMark, Surface};
-
-/// Most parts into which an edge of an element is divided.
-const MAX_DIVISIONS: usize = 32;
-/// Most skin triangles of one body: a bound on memory.
-const MAX_TRIANGLES: usize = 4_000_000;
 
 /// Resolution of a skin, and how cuts divide it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -32,40 +24,6 @@ impl Default for SkinSettings {
     fn default() -> Self {
         Self { divisions: 4, snapping: 0.0 }
     }
-}
-
-/// Why no skin could be made.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum SkinError {
-    /// The number of divisions is out of range.
-    #[error("a skin cannot divide edges of elements into {found} parts; allowed are 1 to {MAX_DIVISIONS}")]
-    Divisions {
-        /// Number requested.
-        found: usize,
-    },
-    /// The skin would have too many triangles.
-    #[error(
-        "the skin would have {found} triangles, at most {MAX_TRIANGLES} are allowed; use fewer divisions or a coarser surface"
-    )]
-    TooFine {
-        /// Number requested.
-        found: usize,
-    },
-    /// The snapping distance is out of range.
-    #[error("the snapping distance of a skin is {found}; allowed are fractions of an edge from 0 to 0.5")]
-    Snapping {
-        /// Distance requested.
-        found: f64,
-    },
-    /// The body has already been cut.
-    #[error("only an uncut body can be given a skin; reset the body first")]
-    AlreadyCut,
-    /// The shape function returned a position that is not finite.
-    #[error("skin point {point} has a coordinate that is not finite")]
-    NonFinitePlace {
-        /// Index of the point.
-        point: usize,
-    },
 }
 
 /// A skin, and the surface that it makes together with the lips.
@@ -107,27 +65,17 @@ impl Skin {
             return Err(SkinError::AlreadyCut);
         }
         let base = Base::new(cut.mesh(), &cut.fragments);
-        let found = match own {
-            Some(own) => base.faces.len() + own.triangles.len(),
-            None => base.faces.len() * divisions * divisions,
-        };
-        if found > MAX_TRIANGLES {
-            return Err(SkinError::TooFine { found });
-        }
         let (sheet, kept) = match own {
             Some(own) => {
-                let (sheet, kept) = own_sheet(&base, &cut.mesh().nodes, own, shape);
+                let (sheet, kept) = own_sheet(&base, &cut.mesh().nodes, own, shape)?;
                 (sheet, Some(kept))
             }
-            None => (Sheet::new(&base, &cut.mesh().nodes, divisions, shape), None),
+            None => {
+                check_size(base.faces.len() * divisions * divisions)?;
+                (Sheet::new(&base, &cut.mesh().nodes, divisions, shape), None)
+            }
         };
-        let found = sheet.corners.len();
-        if found > MAX_TRIANGLES {
-            return Err(SkinError::TooFine { found });
-        }
-        if let Some(point) = sheet.points.iter().position(|p| !p.place.iter().all(|c| c.is_finite())) {
-            return Err(SkinError::NonFinitePlace { point });
-        }
+        check(&sheet)?;
         let mut skin = Self {
             settings,
             base,
@@ -253,18 +201,4 @@ impl Skin {
     pub fn settings(&self) -> SkinSettings {
         self.settings
     }
-}
-
-/// A skin of the triangles of a surface, and how many of them it has.
-fn own_sheet(
-    base: &Base,
-    nodes: &[Vector3<f64>],
-    own: &OwnSurface<'_>,
-    shape: &mut SkinShape<'_>,
-) -> (Sheet, Kept) {
-    let mut sheet = Sheet::new(base, nodes, 1, &mut |flat, _| *flat);
-    let overlay = Overlay::new(base, nodes, own, &mut sheet);
-    let kept = rest_on(own, &overlay, nodes, &mut sheet, shape);
-    sheet.forget_chains();
-    (sheet, kept)
 }

@@ -24,10 +24,12 @@
 
 mod base;
 mod sheet;
+mod error;
 mod own;
 mod pen;
 mod overlay;
 mod patch;
+mod laid;
 mod insert;
 mod walk;
 mod misfit;
@@ -37,8 +39,10 @@ mod incision_mark;
 mod embedding;
 mod incision;
 
-pub use embedding::{Skin, SkinError, SkinSettings};
+pub use embedding::{Skin, SkinSettings};
+pub use error::SkinError;
 pub use incision::{Penetration, incision};
+pub use laid::{Ground, Laid, LaidPoint};
 pub use misfit::Misfit;
 pub use own::{Kept, Landing, OwnSurface};
 pub use sheet::SkinShape;

@@ -41,5 +41,6 @@ pub enum RawSkinTriangles {
     Divided,
     /// Those of the surface, so that its shape and its texture coordinates are exact. Faces of the elements divide
     /// them further. Where the elements are too coarse for the surface, the skin follows it as a divided one does.
+    /// Cells can have only such a skin; where they are cut, about two cells on either side, it is that of the cells.
     Own,
 }
