@@ -116,7 +116,11 @@ fn what_does_not_go_with_an_octree_is_refused() {
     refused("young_pa = 2e5", method, &["found `multigrid` with a law", "pcg"]);
     let xfem = "young_pa = 2e5\n    cutting = { method = \"xfem\" }";
     refused("young_pa = 2e5", xfem, &["found `xfem` with octree", "cut along links"]);
-    refused("young_pa = 2e5", "young_pa = 2e5\n    skin = {}", &["body.block.skin", "linear tetrahedra"]);
+    refused(
+        "young_pa = 2e5",
+        "young_pa = 2e5\n    skin = {}",
+        &["body.block.skin", "no faces of elements", "own"],
+    );
     let bare = "where = { sphere = { centre_m = [0.05, 0.02, 0.02], radius_m = 0.012 } }\n    young_pa = 2e6\n    density_kg_m3 = 2000";
     refused(bare, "where = { slab = { axis = \"x\", from = 0, to = 1 } }", &["material of the body"]);
     refused(

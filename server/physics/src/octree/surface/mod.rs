@@ -19,6 +19,7 @@
 //! incisions near their crossing.
 
 mod links;
+mod mosaic;
 mod own;
 mod patches;
 mod place;

@@ -9,15 +9,17 @@
 //! Each point of the surface is bound to the nearest of the cells around the vertices that it lies between. As long as
 //! these are whole, links join those cells.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
 use super::super::cells::Octree;
 use super::super::coarsen::Coarsening;
+use super::super::lattice::OUTSIDE;
+use super::OctreeSurface;
+use super::mosaic::{Mosaic, Source};
 use super::place::{Crossing, bind};
-use super::{NONE, OctreeSurface};
 use crate::cut::Surface;
 use crate::element::MaterialPoint;
 use crate::space::skin::{Ground, Kept, Laid, LaidPoint, OwnSurface, SkinError, SkinShape};
@@ -31,9 +33,13 @@ pub struct OwnSkin {
     carried: Vec<(u32, u32)>,
     /// Each point of the surface in the material.
     bound: Vec<MaterialPoint>,
-    /// Whether the three vertices of each triangle of dual contouring are whole.
+    /// Whether the three vertices of each triangle of dual contouring are whole, and whether the surface's own triangles are
+    /// shown over it.
     whole: Vec<bool>,
-    surface: Surface,
+    shown: Vec<bool>,
+    /// Half-edges of doubled edges that are divided.
+    halved: BTreeSet<u32>,
+    mosaic: Mosaic,
 }
 
 /// What the skin was like before all cuts.
@@ -45,15 +51,6 @@ struct Uncut {
     twin: Vec<u32>,
     crossings: Vec<Crossing>,
     turned: Vec<bool>,
-}
-
-/// A vertex of the surface that is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Source {
-    /// Point of the surface that was laid.
-    Own(u32),
-    /// Vertex of dual contouring.
-    Dual(u32),
 }
 
 /// A vertex with its place at rest [m].
@@ -100,7 +97,9 @@ impl OwnSkin {
             carried: Vec::new(),
             bound: Vec::new(),
             whole: Vec::new(),
-            surface: Surface::default(),
+            shown: Vec::new(),
+            halved: BTreeSet::new(),
+            mosaic: Mosaic::default(),
         };
         skin.begin_anew(octree, dual);
         Ok(skin)
@@ -108,7 +107,7 @@ impl OwnSkin {
 
     /// Skin and lips.
     pub fn surface(&self) -> &Surface {
-        &self.surface
+        self.mosaic.surface()
     }
 
     /// How much of the surface became the skin of the uncut body.
@@ -119,45 +118,52 @@ impl OwnSkin {
     /// Returns to the uncut body; `dual` is its surface.
     pub fn begin_anew(&mut self, octree: &Octree, dual: &OctreeSurface) {
         self.leaf.clone_from(&self.uncut.leaf);
+        self.carry();
+        let points = self.leaf.iter().zip(&self.uncut.laid.points);
+        self.bound = points.map(|(&leaf, point)| bind(octree, leaf, point.rest).point).collect();
+        self.mosaic = Mosaic::default();
+        self.shown.clear();
         self.whole = vec![true; 2 * dual.faces.len()];
-        self.bind_all(octree);
-        self.show(octree, dual);
+        self.show(octree, dual, 0..dual.faces.len() as u32);
     }
 
-    /// Follows a change that `dual` has followed: `cells` have other vertices.
+    /// Follows a change that `dual` has followed: `cells` have other vertices. The cost depends on what changed.
     pub fn follow(&mut self, octree: &Octree, dual: &OctreeSurface, cells: &[u32]) {
         for &cell in cells {
             let first = self.carried.partition_point(|(leaf, _)| *leaf < cell);
             let points = self.carried[first..].iter().take_while(|(leaf, _)| *leaf == cell);
             for &(_, p) in points {
-                self.bound[p as usize] = bind(octree, cell, self.uncut.laid.points[p as usize].rest).point;
+                let point = bind(octree, cell, self.uncut.laid.points[p as usize].rest).point;
+                self.mosaic.rebind(Source::Own(p), &point);
+                self.bound[p as usize] = point;
             }
         }
-        self.look_again(dual);
-        self.show(octree, dual);
+        self.look_again(dual, &dual.around);
+        self.show(octree, dual, dual.around.iter().copied());
     }
 
     /// Follows a coarsening that `dual` has followed.
     pub fn follow_coarsening(&mut self, octree: &Octree, dual: &OctreeSurface, change: &Coarsening) {
         self.leaf.iter_mut().for_each(|leaf| *leaf = change.cell_of[*leaf as usize]);
-        self.bind_all(octree);
-        self.look_again(dual);
-        self.show(octree, dual);
+        self.carry();
+        // Points on vertices that vanished are bound anew: their leaves are among the changed ones.
+        let vertex = |v: u32| Some(change.vertex_of[v as usize]).filter(|v| *v != OUTSIDE).unwrap_or(0);
+        self.bound.iter_mut().for_each(|point| *point = point.renumbered(vertex));
+        self.mosaic.renumber(vertex);
+        self.follow(octree, dual, &change.cells);
     }
 
-    fn bind_all(&mut self, octree: &Octree) {
+    /// Sorts the points by their cells.
+    fn carry(&mut self) {
         self.carried.clear();
         self.carried.extend(self.leaf.iter().copied().zip(0..));
         self.carried.sort_unstable();
-        self.bound.clear();
-        let points = self.leaf.iter().zip(&self.uncut.laid.points);
-        self.bound.extend(points.map(|(&leaf, point)| bind(octree, leaf, point.rest).point));
     }
 
-    /// Determines which triangles around the vertices that changed last are whole.
-    fn look_again(&mut self, dual: &OctreeSurface) {
+    /// Determines which triangles of these quads are whole.
+    fn look_again(&mut self, dual: &OctreeSurface, quads: &[u32]) {
         self.whole.resize(2 * dual.faces.len(), false);
-        for &q in dual.around.iter().filter(|q| (**q as usize) < self.uncut.turned.len()) {
+        for &q in quads.iter().filter(|q| (**q as usize) < self.uncut.turned.len()) {
             let whole = [0, 1, 2, 3].map(|k| self.is_whole(dual, 4 * q + k));
             let same = dual.turned[q as usize] == self.uncut.turned[q as usize];
             for t in 2 * q..2 * q + 2 {
@@ -178,128 +184,85 @@ impl OwnSkin {
         whole
     }
 
-    /// Puts the surface together.
-    fn show(&mut self, octree: &Octree, dual: &OctreeSurface) {
-        let halved = dual.halved();
-        let divided: BTreeSet<u32> = halved.iter().map(|h| h / 3).collect();
-        let mut made = Made {
-            skin: self,
-            octree,
-            dual,
-            own: vec![NONE; self.uncut.laid.points.len()],
-            of_dual: vec![NONE; dual.rest.len()],
-            middles: BTreeMap::new(),
-            surface: Surface::default(),
-        };
-        for t in 0..2 * dual.faces.len() as u32 {
+    /// Shows what lies over these quads anew, with everything beside it that this changes.
+    fn show(&mut self, octree: &Octree, dual: &OctreeSurface, quads: impl Iterator<Item = u32>) {
+        let halved: BTreeSet<u32> =
+            dual.doubled_half_edges().flat_map(|h| [h, dual.triangle_twin(h)]).collect();
+        let mut stale: Vec<u32> = quads.flat_map(|q| [2 * q, 2 * q + 1]).collect();
+        stale.extend(self.halved.iter().chain(&halved).map(|h| h / 3));
+        stale.sort_unstable();
+        stale.dedup();
+        self.halved = halved;
+        self.shown.resize(2 * dual.faces.len(), false);
+        for i in 0..stale.len() {
+            let t = stale[i];
+            let shown = self.whole[t as usize] && self.halved.range(3 * t..3 * t + 3).next().is_none();
+            if std::mem::replace(&mut self.shown[t as usize], shown) != shown {
+                stale.extend((3 * t..3 * t + 3).map(|h| dual.triangle_twin(h) / 3));
+            }
+        }
+        stale.sort_unstable();
+        stale.dedup();
+        self.mosaic.set_groups(2 * dual.faces.len());
+        stale.iter().for_each(|&t| self.mosaic.clear(t));
+        for &t in &stale {
             let tag = dual.surface.tags[t as usize];
-            if made.skin.is_shown(t, &divided) {
+            if self.shown[t as usize] {
                 for corners in self.uncut.laid.over(t) {
-                    let corners = corners.map(|p| made.vertex(Source::Own(p)).0);
-                    made.add(corners, tag);
+                    let corners = corners.map(|p| self.mosaic.vertex(Source::Own(p), self.bound[p as usize]));
+                    self.mosaic.add(t, corners, tag);
                 }
             } else {
-                made.divide(t, tag, &halved, &divided);
+                self.divide(octree, dual, t, tag);
             }
         }
-        self.surface = made.surface;
-    }
-
-    fn is_shown(&self, t: u32, divided: &BTreeSet<u32>) -> bool {
-        self.whole[t as usize] && !divided.contains(&t)
-    }
-}
-
-/// A surface that is being put together.
-struct Made<'a> {
-    skin: &'a OwnSkin,
-    octree: &'a Octree,
-    dual: &'a OctreeSurface,
-    /// Vertex of each point of the surface that was laid, if it has one already.
-    own: Vec<u32>,
-    /// The same for each vertex of dual contouring.
-    of_dual: Vec<u32>,
-    /// Vertices in the middle of edges, by the smaller of their half-edges.
-    middles: BTreeMap<u32, Placed>,
-    surface: Surface,
-}
-
-impl Made<'_> {
-    fn add(&mut self, corners: [u32; 3], tag: u32) {
-        self.surface.triangles.push(corners);
-        self.surface.tags.push(tag);
-    }
-
-    fn push(&mut self, point: MaterialPoint) -> u32 {
-        self.surface.vertices.push(point);
-        self.surface.vertices.len() as u32 - 1
-    }
-
-    fn vertex(&mut self, source: Source) -> Placed {
-        let (number, rest, point) = match source {
-            Source::Own(p) => {
-                let p = p as usize;
-                (self.own[p], self.skin.uncut.laid.points[p].rest, self.skin.bound[p])
-            }
-            Source::Dual(v) => {
-                let v = v as usize;
-                (self.of_dual[v], self.dual.rest[v], self.dual.surface.vertices[v])
-            }
-        };
-        if number != NONE {
-            return (number, rest);
-        }
-        let number = self.push(point);
-        match source {
-            Source::Own(p) => self.own[p as usize] = number,
-            Source::Dual(v) => self.of_dual[v as usize] = number,
-        }
-        (number, rest)
+        self.mosaic.drop_loose();
     }
 
     /// Shows a triangle of dual contouring, as a fan if points lie on its edges.
-    fn divide(&mut self, t: u32, tag: u32, halved: &BTreeSet<u32>, divided: &BTreeSet<u32>) {
+    fn divide(&mut self, octree: &Octree, dual: &OctreeSurface, t: u32, tag: u32) {
+        let bound = |at: Vector3<f64>| bind(octree, dual.faces[t as usize / 2] / 6, at).point;
         let mut ring: Vec<Placed> = Vec::with_capacity(8);
         for h in 3 * t..3 * t + 3 {
-            let corner = self.corner(h);
+            let corner = self.corner(dual, h);
             ring.push(corner);
-            let twin = self.dual.triangle_twin(h);
-            if self.skin.is_shown(twin / 3, divided) {
-                for &p in self.skin.uncut.laid.side(twin).iter().rev() {
-                    ring.push(self.vertex(Source::Own(p)));
-                }
-            } else if halved.contains(&h) {
-                let next = self.corner(h / 3 * 3 + (h + 1) % 3);
-                ring.push(self.middle(h.min(twin), t, (corner.1 + next.1) / 2.0));
+            let twin = dual.triangle_twin(h);
+            if self.shown[twin as usize / 3] {
+                let own = self.uncut.laid.side(twin).iter().rev();
+                ring.extend(own.map(|&p| {
+                    let v = self.mosaic.vertex(Source::Own(p), self.bound[p as usize]);
+                    (v, self.uncut.laid.points[p as usize].rest)
+                }));
+            } else if self.halved.contains(&h) {
+                // The same for both triangles at the edge.
+                let edge = h.min(twin);
+                let ends = [edge, edge / 3 * 3 + (edge + 1) % 3].map(|h| self.corner(dual, h).1);
+                let at = (ends[0] + ends[1]) / 2.0;
+                let point = bind(octree, dual.faces[edge as usize / 6] / 6, at).point;
+                ring.push((self.mosaic.vertex(Source::Middle(edge), point), at));
             }
         }
         if let [a, b, c] = ring[..] {
-            return self.add([a, b, c].map(|p| p.0), tag);
+            return self.mosaic.add(t, [a, b, c].map(|p| p.0), tag);
         }
         let mean = ring.iter().map(|p| p.1).sum::<Vector3<f64>>() / ring.len() as f64;
-        let centre = self.push(bind(self.octree, self.dual.faces[t as usize / 2] / 6, mean).point);
+        let centre = self.mosaic.vertex(Source::Centre(t), bound(mean));
         for k in 0..ring.len() {
-            self.add([ring[k].0, ring[(k + 1) % ring.len()].0, centre], tag);
+            self.mosaic.add(t, [ring[k].0, ring[(k + 1) % ring.len()].0, centre], tag);
         }
     }
 
     /// The vertex at the first end of half-edge 3·triangle + k.
-    fn corner(&mut self, h: u32) -> Placed {
-        let corner = self.dual.corner(h);
-        // Triangles in which one diagonal has taken the place of the other have the same corners.
-        let own = self.skin.is_whole(self.dual, corner).then(|| self.skin.uncut.own_point(corner));
-        self.vertex(own.map_or_else(|| Source::Dual(self.dual.patches.vertex(corner)), Source::Own))
-    }
-
-    /// The vertex in the middle of an edge.
-    fn middle(&mut self, edge: u32, t: u32, at: Vector3<f64>) -> Placed {
-        if let Some(known) = self.middles.get(&edge) {
-            return *known;
+    fn corner(&mut self, dual: &OctreeSurface, h: u32) -> Placed {
+        let corner = dual.corner(h);
+        if self.is_whole(dual, corner) {
+            let p = self.uncut.own_point(corner);
+            let point = self.bound[p as usize];
+            return (self.mosaic.vertex(Source::Own(p), point), self.uncut.laid.points[p as usize].rest);
         }
-        let point = bind(self.octree, self.dual.faces[t as usize / 2] / 6, at).point;
-        let made = (self.push(point), at);
-        self.middles.insert(edge, made);
-        made
+        let v = dual.patches.vertex(corner);
+        let point = dual.surface.vertices[v as usize];
+        (self.mosaic.vertex(Source::Dual(v), point), dual.rest[v as usize])
     }
 }
 
@@ -327,11 +290,6 @@ impl OctreeSurface {
     /// Where its vertices rest before doubled edges are divided [m].
     pub fn rest(&self) -> &[Vector3<f64>] {
         &self.rest
-    }
-
-    /// The half-edges of all doubled edges that are divided.
-    fn halved(&self) -> BTreeSet<u32> {
-        self.doubled_half_edges().flat_map(|h| [h, self.triangle_twin(h)]).collect()
     }
 }
 

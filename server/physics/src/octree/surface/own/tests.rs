@@ -97,14 +97,14 @@ fn check_worn(octree: &Octree, skin: &OwnSkin) {
 
 /// The same skin, with everything that cuts determine found anew.
 fn anew(octree: &Octree, dual: &OctreeSurface, skin: &OwnSkin) -> OwnSkin {
-    let mut whole = skin.clone();
-    let mut dual = dual.clone();
-    dual.around = (0..dual.faces.len() as u32).collect();
-    whole.whole.clear();
-    whole.bind_all(octree);
-    whole.look_again(&dual);
-    whole.show(octree, &dual);
-    whole
+    let mut other = skin.clone();
+    let quads: Vec<u32> = (0..dual.faces.len() as u32).collect();
+    let points = other.leaf.iter().zip(&other.uncut.laid.points);
+    other.bound = points.map(|(&leaf, point)| bind(octree, leaf, point.rest).point).collect();
+    (other.mosaic, other.shown, other.halved) = Default::default();
+    other.look_again(dual, &quads);
+    other.show(octree, dual, quads.into_iter());
+    other
 }
 
 #[test]
