@@ -4,6 +4,8 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use scindo_world::inputs::Inputs;
 use scindo_world::mesh_in::Organ;
@@ -83,17 +85,30 @@ fn every_shipped_scene_meets_its_own_tolerance() {
     let directory = tempfile::tempdir().unwrap();
     let organ = directory.path().join("organ.obj");
     write_surface(&organ);
-    let mut found = Vec::new();
-    for path in shipped() {
+    let run = |path: &Path| {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         let mut overrides: Vec<String> = Vec::new();
-        let text = fs::read_to_string(&path).unwrap();
+        let text = fs::read_to_string(path).unwrap();
         if text.contains("\"organ.obj\"") && !scenes().join("organ.obj").exists() {
             overrides.push(format!("body.organ.mesh.surface={:?}", organ.display().to_string()));
         }
-        let scene = Scene::load_with(&path, &overrides).unwrap();
-        found.extend(complaints(&name, Simulation::new(&scene, scene.base_dir()).unwrap()));
-    }
+        let scene = Scene::load_with(path, &overrides).unwrap();
+        complaints(&name, Simulation::new(&scene, scene.base_dir()).unwrap())
+    };
+    // Most scenes step on one thread; as many as there are cores step side by side.
+    let (files, next, found) = (shipped(), AtomicUsize::new(0), Mutex::new(Vec::new()));
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                while let Some(path) = files.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let wrong = run(path);
+                    found.lock().unwrap().extend(wrong);
+                }
+            });
+        }
+    });
+    let mut found = found.into_inner().unwrap();
+    found.sort();
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
