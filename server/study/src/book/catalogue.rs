@@ -37,7 +37,7 @@ pub enum Good {
     Less,
     /// More than the printed value.
     More,
-    /// Nothing: the values are only shown.
+    /// The printed value; another one is neither better nor worse.
     Told,
     /// A printed 0.
     Zero,
@@ -73,7 +73,7 @@ pub struct Number {
     pub open: Option<String>,
     /// Why it cannot be right.
     pub refuted: Option<String>,
-    /// Why the measured value is worse, where it is.
+    /// Why the measured value is worse, or another one, where it is.
     pub because: Option<String>,
 }
 

@@ -183,8 +183,8 @@ pub fn index(
         out += "</div></td></tr>\n";
     }
     out += "</tbody></table></div>\n<p class=\"soft\">Reproduced: the value agrees. Better: on the better side, on equal \
-            cores where these matter. Refuted: the printed value cannot be right, with the reason. Shown: neither is \
-            better. Not yet: no measurement.</p>\n";
+            cores where these matter. Refuted: the printed value cannot be right, with the reason. Explained: another \
+            value, with the reason, and neither is better. Not yet: no measurement.</p>\n";
     out += "<h2>Studies</h2>\n<div class=\"scroll\"><table>\n<thead><tr><th>study</th><th>result</th>\
             <th class=\"number\">took</th><th>report</th></tr></thead>\n<tbody>\n";
     for part in parts {

@@ -22,6 +22,10 @@ fn every_printed_number_has_a_source_or_a_reason() {
         for number in &paper.number {
             let name = format!("{}: {}, {}", paper.id, number.place, number.what);
             assert!(seen.insert((&number.place, &number.what)), "{name}: twice");
+            assert!(
+                number.good != Good::Told || number.because.is_some(),
+                "{name}: why is it another value?"
+            );
             assert!(number.from.is_some() || number.open.is_some() || number.refuted.is_some(), "{name}");
             assert!(
                 number.printed.is_finite() && (number.printed != 0.0 || number.good == Good::Zero),
@@ -73,6 +77,13 @@ fn verdicts_follow_the_values() {
         printed = 2.0
         unit = "times"
         good = "more"
+        [[number]]
+        place = ""
+        what = "count"
+        printed = 100.0
+        unit = "count"
+        good = "told"
+        because = "another mesh"
     "#;
     let paper: catalogue::Paper = toml::from_str(text).unwrap();
     let verdicts = |number: usize, values: &[f64]| -> Vec<Verdict> {
@@ -83,6 +94,12 @@ fn verdicts_follow_the_values() {
     assert_eq!(verdicts(1, &[0.52, 0.6]), [Verdict::Reproduced, Verdict::Refuted]);
     assert_eq!(verdicts(0, &[f64::NAN]), [Verdict::NotYet]);
     assert_eq!(verdicts(2, &[1.5, 1.95, 3.0]), [Verdict::Worse, Verdict::Reproduced, Verdict::Better]);
+    assert_eq!(
+        verdicts(3, &[104.0, 80.0, 120.0]),
+        [Verdict::Reproduced, Verdict::Explained, Verdict::Explained]
+    );
+    assert_eq!(verdict::reason(&paper.number[3], Verdict::Explained), Some("another mesh"));
+    assert_eq!(verdict::reason(&paper.number[3], Verdict::Reproduced), None);
     assert_eq!(judge(&paper, &paper.number[0], None), Verdict::NotYet);
     assert_eq!(judge(&paper, &paper.number[1], None), Verdict::Refuted);
 }

@@ -11,8 +11,8 @@ pub enum Verdict {
     Better,
     /// The printed value cannot be right, for a stated reason.
     Refuted,
-    /// Both values are shown, and neither is better.
-    Told,
+    /// The measured value is another one, for a stated reason, and neither is better.
+    Explained,
     /// The measured value is worse, or another one.
     Worse,
     /// There is no measured value yet.
@@ -22,7 +22,7 @@ pub enum Verdict {
 impl Verdict {
     /// All verdicts, the best first.
     pub const ALL: [Self; 6] =
-        [Self::Reproduced, Self::Better, Self::Refuted, Self::Told, Self::Worse, Self::NotYet];
+        [Self::Reproduced, Self::Better, Self::Refuted, Self::Explained, Self::Worse, Self::NotYet];
 
     /// In words.
     pub fn name(self) -> &'static str {
@@ -30,7 +30,7 @@ impl Verdict {
             Self::Reproduced => "reproduced",
             Self::Better => "better",
             Self::Refuted => "refuted",
-            Self::Told => "shown",
+            Self::Explained => "explained",
             Self::Worse => "worse",
             Self::NotYet => "not yet",
         }
@@ -50,10 +50,10 @@ pub fn judge(paper: &Paper, number: &Number, ours: Option<f64>) -> Verdict {
     let bar = number.bar(paper);
     let apart = ours / bar - 1.0;
     let verdict = match number.good {
-        Good::Told => Verdict::Told,
         Good::Zero if ours < NEAR_ZERO => Verdict::Reproduced,
         Good::Zero => Verdict::Worse,
         _ if apart.abs() <= number.within => Verdict::Reproduced,
+        Good::Told => Verdict::Explained,
         Good::Less if apart < 0.0 => Verdict::Better,
         Good::More if apart > 0.0 => Verdict::Better,
         _ => Verdict::Worse,
@@ -64,6 +64,7 @@ pub fn judge(paper: &Paper, number: &Number, ours: Option<f64>) -> Verdict {
 /// The reason for a verdict that the values do not give by themselves.
 pub fn reason(number: &Number, verdict: Verdict) -> Option<&str> {
     let open = number.open.as_deref().filter(|_| verdict == Verdict::NotYet);
-    let because = number.because.as_deref().filter(|_| verdict == Verdict::Worse);
+    let because =
+        number.because.as_deref().filter(|_| matches!(verdict, Verdict::Worse | Verdict::Explained));
     number.refuted.as_deref().or(open).or(because)
 }
