@@ -9,6 +9,8 @@
 //! A vertex lies where the planes of the cuts around it [meet](place), which keeps rims sharp. It is bound to the
 //! nearest cell of its patch.
 //!
+//! A body that was made from a surface can show [its triangles](own) where no cut has touched them.
+//!
 //! # Source
 //! Ju, Losasso, Schaefer, Warren 2002: Dual contouring of Hermite data. Schaefer, Ju, Warren 2007: Manifold dual
 //! contouring. Wu, Dick, Westermann 2011: Interactive high-resolution boundary surfaces for deformable bodies with
