@@ -61,7 +61,7 @@ pub struct Number {
     pub within: f64,
     /// Where it is measured: part, table, row, column; or `stress`, case, figure.
     pub from: Option<String>,
-    /// The same in the quick form of the book, if it differs.
+    /// The same in the quick form of the book, if it differs; empty if that measures something smaller.
     pub quick: Option<String>,
     /// Factor from the measured to the printed unit.
     #[serde(default = "one")]
@@ -99,7 +99,7 @@ impl Number {
     /// Where it is measured, in parts.
     pub fn source(&self, quick: bool) -> Option<Vec<&str>> {
         let from = self.quick.as_ref().filter(|_| quick).or(self.from.as_ref())?;
-        Some(from.split(" / ").collect())
+        (!from.is_empty()).then(|| from.split(" / ").collect())
     }
 
     /// The command that measures it.
