@@ -8,6 +8,10 @@
 //!
 //! Each point of the surface is bound to the nearest of the cells around the vertices that it lies between. As long as
 //! these are whole, links join those cells.
+//!
+//! # Limit
+//! Points outside their cells are carried by their extrapolation, which differs from that of the next cell by about
+//! h²u″/2. Triangles that are much finer than cells show this as faint steps where the body is strongly bent.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
