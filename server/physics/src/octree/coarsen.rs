@@ -47,6 +47,12 @@ impl Coarsening {
         let mut vertex = self.vertex_of.iter();
         values.retain(|_| vertex.next().is_none_or(|&vertex| vertex != OUTSIDE));
     }
+
+    /// A point of the surface by new numbers of its vertices. One on a vertex that vanished has to be bound anew: its leaf
+    /// is among the changed [`cells`](Self::cells).
+    pub fn renumbered(&self, point: &MaterialPoint) -> MaterialPoint {
+        point.renumbered(|v| Some(self.vertex_of[v as usize]).filter(|v| *v != OUTSIDE).unwrap_or(0))
+    }
 }
 
 /// A coarsening under way, by earlier numbers.

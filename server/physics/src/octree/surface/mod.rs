@@ -105,9 +105,7 @@ impl OctreeSurface {
         for (q, &face) in (0u32..).zip(&self.faces) {
             self.quad_at[face as usize] = q;
         }
-        // Points on vertices that vanished are placed anew: their leaves are among the changed ones.
-        let vertex = |v: u32| Some(change.vertex_of[v as usize]).filter(|v| *v != OUTSIDE).unwrap_or(0);
-        self.surface.vertices.iter_mut().for_each(|point| *point = point.renumbered(vertex));
+        self.surface.vertices.iter_mut().for_each(|point| *point = change.renumbered(point));
         self.follow(octree, &change.cells, &[]);
     }
 

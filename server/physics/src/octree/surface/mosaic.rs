@@ -93,9 +93,9 @@ impl Mosaic {
         &mut list[i]
     }
 
-    /// Takes new numbers of what carries the vertices.
-    pub fn renumber(&mut self, number: impl Fn(u32) -> u32) {
-        self.surface.vertices.iter_mut().for_each(|point| *point = point.renumbered(&number));
+    /// Moves every vertex to another place in the material.
+    pub fn rebind_all(&mut self, place: impl Fn(&MaterialPoint) -> MaterialPoint) {
+        self.surface.vertices.iter_mut().for_each(|point| *point = place(point));
     }
 
     /// Adds a triangle to a group.

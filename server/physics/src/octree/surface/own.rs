@@ -20,7 +20,6 @@ use nalgebra::Vector3;
 
 use super::super::cells::Octree;
 use super::super::coarsen::Coarsening;
-use super::super::lattice::OUTSIDE;
 use super::OctreeSurface;
 use super::mosaic::{Mosaic, Source};
 use super::place::{Crossing, bind};
@@ -58,7 +57,7 @@ struct Uncut {
 }
 
 /// A vertex with its place at rest [m].
-type Placed = (u32, Vector3<f64>);
+type PlacedVertex = (u32, Vector3<f64>);
 
 impl OwnSkin {
     /// Lays `own` on the surface of an uncut body. Where the two do not go together, the skin rests where `shape` says.
@@ -150,10 +149,8 @@ impl OwnSkin {
     pub fn follow_coarsening(&mut self, octree: &Octree, dual: &OctreeSurface, change: &Coarsening) {
         self.leaf.iter_mut().for_each(|leaf| *leaf = change.cell_of[*leaf as usize]);
         self.carry();
-        // Points on vertices that vanished are bound anew: their leaves are among the changed ones.
-        let vertex = |v: u32| Some(change.vertex_of[v as usize]).filter(|v| *v != OUTSIDE).unwrap_or(0);
-        self.bound.iter_mut().for_each(|point| *point = point.renumbered(vertex));
-        self.mosaic.renumber(vertex);
+        self.bound.iter_mut().for_each(|point| *point = change.renumbered(point));
+        self.mosaic.rebind_all(|point| change.renumbered(point));
         self.follow(octree, dual, &change.cells);
     }
 
@@ -209,11 +206,12 @@ impl OwnSkin {
         stale.dedup();
         self.mosaic.set_groups(2 * dual.faces.len());
         stale.iter().for_each(|&t| self.mosaic.clear(t));
+        let uncut = Arc::clone(&self.uncut);
         for &t in &stale {
             let tag = dual.surface.tags[t as usize];
             if self.shown[t as usize] {
-                for corners in self.uncut.laid.over(t) {
-                    let corners = corners.map(|p| self.mosaic.vertex(Source::Own(p), self.bound[p as usize]));
+                for corners in uncut.laid.over(t) {
+                    let corners = corners.map(|p| self.own_vertex(p).0);
                     self.mosaic.add(t, corners, tag);
                 }
             } else {
@@ -225,18 +223,14 @@ impl OwnSkin {
 
     /// Shows a triangle of dual contouring, as a fan if points lie on its edges.
     fn divide(&mut self, octree: &Octree, dual: &OctreeSurface, t: u32, tag: u32) {
-        let bound = |at: Vector3<f64>| bind(octree, dual.faces[t as usize / 2] / 6, at).point;
-        let mut ring: Vec<Placed> = Vec::with_capacity(8);
+        let mut ring: Vec<PlacedVertex> = Vec::with_capacity(8);
         for h in 3 * t..3 * t + 3 {
             let corner = self.corner(dual, h);
             ring.push(corner);
             let twin = dual.triangle_twin(h);
             if self.shown[twin as usize / 3] {
-                let own = self.uncut.laid.side(twin).iter().rev();
-                ring.extend(own.map(|&p| {
-                    let v = self.mosaic.vertex(Source::Own(p), self.bound[p as usize]);
-                    (v, self.uncut.laid.points[p as usize].rest)
-                }));
+                let uncut = Arc::clone(&self.uncut);
+                ring.extend(uncut.laid.side(twin).iter().rev().map(|&p| self.own_vertex(p)));
             } else if self.halved.contains(&h) {
                 // The same for both triangles at the edge.
                 let edge = h.min(twin);
@@ -250,19 +244,24 @@ impl OwnSkin {
             return self.mosaic.add(t, [a, b, c].map(|p| p.0), tag);
         }
         let mean = ring.iter().map(|p| p.1).sum::<Vector3<f64>>() / ring.len() as f64;
-        let centre = self.mosaic.vertex(Source::Centre(t), bound(mean));
+        let point = bind(octree, dual.faces[t as usize / 2] / 6, mean).point;
+        let centre = self.mosaic.vertex(Source::Centre(t), point);
         for k in 0..ring.len() {
             self.mosaic.add(t, [ring[k].0, ring[(k + 1) % ring.len()].0, centre], tag);
         }
     }
 
+    /// The vertex of a point of the surface.
+    fn own_vertex(&mut self, p: u32) -> PlacedVertex {
+        let v = self.mosaic.vertex(Source::Own(p), self.bound[p as usize]);
+        (v, self.uncut.laid.points[p as usize].rest)
+    }
+
     /// The vertex at the first end of half-edge 3·triangle + k.
-    fn corner(&mut self, dual: &OctreeSurface, h: u32) -> Placed {
+    fn corner(&mut self, dual: &OctreeSurface, h: u32) -> PlacedVertex {
         let corner = dual.corner(h);
         if self.is_whole(dual, corner) {
-            let p = self.uncut.own_point(corner);
-            let point = self.bound[p as usize];
-            return (self.mosaic.vertex(Source::Own(p), point), self.uncut.laid.points[p as usize].rest);
+            return self.own_vertex(self.uncut.own_point(corner));
         }
         let v = dual.patches.vertex(corner);
         let point = dual.surface.vertices[v as usize];
