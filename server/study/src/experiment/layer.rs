@@ -102,7 +102,7 @@ pub struct Rods {
     pub body: Body,
     /// Leaves before and after the cut.
     pub cells: [f64; 2],
-    /// As the paper counts it; see [`model::Cut`](super::model::Cut).
+    /// As the paper counts it; see [`model::Cut`].
     cutting_s: f64,
     /// Rotations, operators of all levels and three cycles [s].
     cycles_s: f64,

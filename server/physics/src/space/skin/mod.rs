@@ -10,7 +10,7 @@
 //!    `snapping`, their corners move onto it. Positions are interpolated, so splitting changes no shape.
 //!    Triangles that do not meet the curve stay as they are.
 //!    The skin of a surface with triangles of its own is [divided along their edges](overlay) instead, and
-//!    [rests on them](patch). Such a surface can also be [laid](laid) on another one than the boundary of tetrahedra.
+//!    [rests on them](patch). Such a surface can also be [laid] on another one than the boundary of tetrahedra.
 //! 3. [`stitch`]: skin triangles and lips become one surface. An edge of the cut curve joins its chain of
 //!    skin edges to the fragment face of the lip, whose border corners move to the skin. Surface vertices are
 //!    cycles of corners, so the result is closed and 2-manifold by construction. Both lips of a fresh cut
