@@ -6,13 +6,13 @@
 #![allow(unsafe_code)] // vector instructions, reached only from functions that enable them
 
 use std::arch::x86_64::{
-    __m128, __m128i, __m256, _CMP_GT_OQ, _MM_FROUND_TO_NEAREST_INT, _MM_HINT_T0, _mm_add_ps, _mm_loadu_ps,
-    _mm_loadu_si128, _mm_prefetch, _mm_storeu_ps, _mm256_add_ps, _mm256_castps128_ps256,
-    _mm256_castps256_ps128, _mm256_cmp_ps, _mm256_cvtpd_ps, _mm256_cvtph_ps, _mm256_cvtps_ph, _mm256_div_ps,
-    _mm256_extractf128_ps, _mm256_fmadd_ps, _mm256_insertf128_ps, _mm256_loadu_pd, _mm256_loadu_ps,
-    _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps, _mm256_set1_ps, _mm256_setzero_ps,
-    _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_storeu_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_ps,
-    _mm256_unpacklo_ps, _mm256_xor_ps,
+    __m128, __m128i, __m256, _CMP_GT_OQ, _MM_FROUND_TO_NEAREST_INT, _mm_add_ps, _mm_loadu_ps,
+    _mm_loadu_si128, _mm_storeu_ps, _mm256_add_ps, _mm256_castps128_ps256, _mm256_castps256_ps128,
+    _mm256_cmp_ps, _mm256_cvtpd_ps, _mm256_cvtph_ps, _mm256_cvtps_ph, _mm256_div_ps, _mm256_extractf128_ps,
+    _mm256_fmadd_ps, _mm256_insertf128_ps, _mm256_loadu_pd, _mm256_loadu_ps, _mm256_movemask_ps,
+    _mm256_mul_ps, _mm256_permute2f128_ps, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps,
+    _mm256_sqrt_ps, _mm256_storeu_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
+    _mm256_xor_ps,
 };
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -84,14 +84,6 @@ impl Vector for Register {
     #[inline(always)]
     fn with_second(self, _: Self) -> Self {
         self
-    }
-
-    #[inline(always)]
-    fn prefetch<T>(value: &T) {
-        for line in 0..size_of::<T>().div_ceil(64) {
-            // SAFETY: a hint, within the value.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>((&raw const *value).cast::<i8>().wrapping_add(64 * line)) };
-        }
     }
 }
 

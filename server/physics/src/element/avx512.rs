@@ -95,11 +95,6 @@ impl Vector for Register512 {
         // SAFETY: only reached from functions that enable AVX-512.
         Self(unsafe { _mm512_mask_blend_ps(0xFF00, self.0, other.0) })
     }
-
-    #[inline(always)]
-    fn prefetch<T>(value: &T) {
-        Register::prefetch(value);
-    }
 }
 
 impl Batched<2> for Register512 {

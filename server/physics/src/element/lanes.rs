@@ -103,10 +103,6 @@ pub trait Vector:
     fn above(self, threshold: f32) -> u16;
     /// The lanes of the first batch from `self`, and of the second, if there is one, from `other`.
     fn with_second(self, other: Self) -> Self;
-
-    /// Asks for a value that is read soon, where the machine can.
-    #[inline(always)]
-    fn prefetch<T>(_: &T) {}
 }
 
 /// Vectors over N batches, in which every batch has eight lanes.

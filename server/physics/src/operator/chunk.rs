@@ -213,6 +213,14 @@ impl Chunk {
         &mut rows[..self.x.len()]
     }
 
+    /// Asks for the stiffness that [`Self::apply`] reads first, before x is gathered.
+    #[inline(always)]
+    pub fn ask_for_stiffness(&self) {
+        if self.edges.is_none() {
+            self.batches.ask_for_first();
+        }
+    }
+
     /// y = s K̂ x; `y` may have more rows than the chunk uses.
     #[inline(always)]
     pub fn apply(&self, simd: Simd, y: &mut [Padded]) {

@@ -308,6 +308,7 @@ impl Stiffness for Elastic {
         let simd = self.simd;
         let sums = ranges(&mut self.sums, &self.gather.first_row);
         team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {
+            chunk[0].ask_for_stiffness();
             let Chunk { copies, x: local, .. } = &mut chunk[0];
             for (local, &copy) in local.iter_mut().zip(copies.iter()) {
                 *local = x[copy as usize];
@@ -320,6 +321,7 @@ impl Stiffness for Elastic {
         let simd = self.simd;
         let sums = ranges(&mut self.sums, &self.gather.first_row);
         team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {
+            chunk[0].ask_for_stiffness();
             let Chunk { copies, x: local, .. } = &mut chunk[0];
             gather_direction(local, copies, z, beta);
             chunk[0].apply(simd, y);

@@ -8,7 +8,7 @@ use super::tet_lanes::{
     Three, UpdatedTet, edges, forces, load, read, scatter_block, sum_of_outer_products, tet_edges, update_tet,
 };
 use super::{Padded, strip_kernel};
-use crate::element::{Batched, Ids, LANES, Lanes, Simd, Vector8};
+use crate::element::{Batched, Ids, LANES, Lanes, Simd, Vector8, prefetch};
 
 /// The batches of one chunk. Their local numbers are checked once, here.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -103,6 +103,13 @@ impl Batches {
         self.live.len() * size_of::<Batch>()
     }
 
+    /// Asks for what [`Self::apply`] reads first.
+    #[inline(always)]
+    pub fn ask_for_first(&self) {
+        let n = strip_kernel::AHEAD * strip_kernel::BATCHES;
+        prefetch(self.live.get(..n).unwrap_or(&self.live));
+    }
+
     /// Rest states and rotations.
     pub fn rest(&self) -> &[RestBatch] {
         &self.rest
@@ -152,6 +159,9 @@ impl Batches {
     }
 }
 
+/// Tets that are in no strip are asked for so many turns ahead; see [`strip_kernel::AHEAD`].
+const AHEAD: usize = 4;
+
 // Loops instead of closures below: see `Vector`. Closures that only name a field are none of those.
 
 /// y += s K̂ x for tets that are in no strip.
@@ -163,7 +173,8 @@ fn apply_with<V: Batched<N>, const N: usize>(
     y: &mut [Padded],
 ) {
     let ratio = V::splat(ratio);
-    for b in batches {
+    for (k, b) in batches.iter().enumerate() {
+        prefetch(batches.get(k + AHEAD).unwrap_or(b));
         // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
         let u = unsafe {
             [
@@ -210,10 +221,14 @@ fn update_with<V: Batched<N>, const N: usize>(
 #[inline(always)]
 fn apply_all<V: Batched<N>, const N: usize>(of: &Batches, x: &[Padded], y: &mut [Padded]) {
     let (strips, single) = of.live.split_at(strip_kernel::BATCHES * of.joined.len());
-    for (strips, &joined) in strips.as_chunks().0.iter().zip(&of.joined) {
+    let strips: &[[Batch; strip_kernel::BATCHES]] = strips.as_chunks().0;
+    for (k, (strip, &joined)) in strips.iter().zip(&of.joined).enumerate() {
         match joined {
-            true => strip_kernel::apply::<V, N>(strips, of.ratio, x, y),
-            false => apply_with::<V, N>(strips.as_chunks().0, of.ratio, x, y),
+            true => {
+                let soon = strips.get(k + strip_kernel::AHEAD).unwrap_or(strip);
+                strip_kernel::apply::<V, N>([strip, soon], of.ratio, x, y);
+            }
+            false => apply_with::<V, N>(strip.as_chunks().0, of.ratio, x, y),
         }
     }
     let (whole, last) = single.as_chunks();

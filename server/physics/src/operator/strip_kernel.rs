@@ -10,10 +10,13 @@ use super::Padded;
 use super::strips::{NODES, TETS};
 use super::tet_batch::{Batch, Coefficients, Locals, RestBatch};
 use super::tet_lanes::{Three, edges, forces, read, scatter_block, tet_edges, update_tet};
-use crate::element::{Batched, Ids, Vector};
+use crate::element::{Batched, Ids, Vector, prefetch};
 
 /// Batches of tets that two batches of strips consist of.
 pub const BATCHES: usize = 2 * TETS;
+
+/// How many pairs of batches of strips ahead stiffness is asked for: a body of half a million tets streams it from memory.
+pub const AHEAD: usize = 2;
 
 /// Whether the tets in every lane of these batches still have a face in common: a cut may have taken them apart.
 pub fn is_joined(batches: &[Batch; BATCHES]) -> bool {
@@ -24,15 +27,17 @@ pub fn is_joined(batches: &[Batch; BATCHES]) -> bool {
 /// y += s K̂ x, as many batches of strips at once as V holds.
 #[inline(always)]
 pub fn apply<V: Batched<N>, const N: usize>(
-    batches: &[Batch; BATCHES],
+    [batches, soon]: [&[Batch; BATCHES]; 2],
     ratio: f32,
     x: &[Padded],
     y: &mut [Padded],
 ) {
     let [first, second, third] = batches.as_chunks::<2>().0 else { return };
     let tets = first.as_chunks().0.iter().zip(second.as_chunks().0).zip(third.as_chunks().0);
-    for ((first, second), third) in tets {
-        apply_strips::<V, N>([first, second, third], ratio, x, y);
+    let [soon_1, soon_2, soon_3] = soon.as_chunks::<2>().0 else { return };
+    let soon = soon_1.as_chunks().0.iter().zip(soon_2.as_chunks().0).zip(soon_3.as_chunks().0);
+    for (((first, second), third), ((soon_1, soon_2), soon_3)) in tets.zip(soon) {
+        apply_strips::<V, N>([first, second, third], [soon_1, soon_2, soon_3], ratio, x, y);
     }
 }
 
@@ -46,6 +51,7 @@ fn nodes<'a>(first: &'a Batch, second: &'a Batch, third: &'a Batch) -> [&'a Ids;
 #[inline(always)]
 fn apply_strips<V: Batched<N>, const N: usize>(
     [first, second, third]: [&[Batch; N]; TETS],
+    soon: [&[Batch; N]; TETS],
     ratio: f32,
     x: &[Padded],
     y: &mut [Padded],
@@ -62,8 +68,11 @@ fn apply_strips<V: Batched<N>, const N: usize>(
             V::gather_all(x, third, |b| &b.nodes[3]),
         ]
     };
+    prefetch(soon[0]);
     let p = forces(&read(first, |b| &b.g), &edges(u[0], u[1], u[2], u[3]), ratio);
+    prefetch(soon[1]);
     let q = forces(&read(second, |b| &b.g), &edges(u[1], u[2], u[3], u[4]), ratio);
+    prefetch(soon[2]);
     let r = forces(&read(third, |b| &b.g), &edges(u[2], u[3], u[4], u[5]), ratio);
     scatter([first, second, third], y, &joined(p, q, r));
 }

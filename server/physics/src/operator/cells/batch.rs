@@ -4,7 +4,7 @@
 
 use super::super::Padded;
 use super::sectors::SectorTable;
-use crate::element::{Batched, Ids, LANES, Lanes, Mat3, Simd, Vector, Vector8, for_eight};
+use crate::element::{Batched, Ids, LANES, Lanes, Mat3, Simd, Vector, Vector8, for_eight, prefetch};
 
 /// Eight cells with one table.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
@@ -96,9 +96,9 @@ unsafe fn multiply_with<V: Batched<N>, const N: usize, const HANGING: bool>(
     y: &mut [Padded],
 ) {
     for (b, batch) in batches.iter().enumerate() {
-        prefetch::<V, _>(batches, b + AHEAD / N);
+        ask_for(batches, b + AHEAD / N);
         if HANGING {
-            prefetch::<V, _>(weights, b + AHEAD / N);
+            ask_for(weights, b + AHEAD / N);
         }
         // Rotations act on components, all other steps on slots: they commute.
         // SAFETY: the caller's promise.
@@ -124,9 +124,9 @@ unsafe fn multiply_with<V: Batched<N>, const N: usize, const HANGING: bool>(
 
 /// Asks for an entry that is needed soon, if there is one.
 #[inline(always)]
-fn prefetch<V: Vector, T>(entries: &[T], at: usize) {
+fn ask_for<T>(entries: &[T], at: usize) {
     if let Some(entry) = entries.get(at) {
-        V::prefetch(entry);
+        prefetch(entry);
     }
 }
 

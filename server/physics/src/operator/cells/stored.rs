@@ -14,7 +14,7 @@ use super::batch::{
 };
 use super::interleave::interleave;
 use super::sectors::Matrix24;
-use crate::element::{Halves, Ids, LANES, Lanes, Mat3, Simd, Vector8};
+use crate::element::{Halves, Ids, LANES, Lanes, Mat3, Simd, Vector8, prefetch};
 
 /// Entries of a stored matrix: the upper triangle, row by row. Row 3 j + i is component i of slot j.
 pub const STORED: usize = 300;
@@ -199,13 +199,11 @@ unsafe fn multiply_with<V: Vector8, E: Entry>(
         }
         let next = batches.get(b + 1);
         let entries = &batch.entries;
-        let ahead = 64 / size_of::<E>();
         // The three rows of a vertex at once: fewer passes over f, and sums that do not wait for each other.
         for r in [0, 3, 6, 9, 12, 15, 18, 21] {
             let rows = [stored_entry(r, r), stored_entry(r + 1, r + 1) - 1, stored_entry(r + 2, r + 2) - 2];
             if let Some(next) = next {
-                let lines = next.entries[rows[0]..rows[2] + 24 - r].chunks(ahead);
-                lines.for_each(|line| V::prefetch(&line[0]));
+                prefetch(&next.entries[rows[0]..rows[2] + 24 - r]);
             }
             let at = |i: usize, s: usize| rows[i] + s - r;
             let (x, y, z) = (v[r], v[r + 1], v[r + 2]);
