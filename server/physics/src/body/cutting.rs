@@ -157,7 +157,10 @@ impl Body {
         for new in new {
             self.rest[new.copy as usize] = new.inherited(&self.rest);
         }
-        self.follow_masses();
+        let Self { dynamics, space, mass, material, settings, .. } = self;
+        if settings.ablation.piece_masses || !dynamics.reweigh(&**space, material.density_kg_m3, mass) {
+            self.follow_masses();
+        }
         self.boundary.hold_between(new, self.space.node_of_copy());
         self.find_fixed();
         if self.boundary.pressures.is_empty() {
@@ -166,8 +169,13 @@ impl Body {
             self.bind_pressures();
             self.gather_loads();
         }
-        self.connectivity.follow(&mut self.parts, &*self.space, new, &self.mass, &self.fixed);
-        self.follow_parts();
+        let Self { connectivity, parts, space, mass, fixed, .. } = self;
+        if connectivity.follow(parts, &**space, new, mass, fixed) {
+            self.dynamics.follow_parts();
+            self.range.follow_new(&self.rest, new, &self.parts, &self.fixed);
+        } else {
+            self.follow_parts();
+        }
     }
 
     /// Updates the masses, and what the integrator derives from them.

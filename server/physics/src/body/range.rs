@@ -6,6 +6,7 @@
 
 use nalgebra::Vector3;
 
+use crate::cut::NewCopy;
 use crate::integrator::LooseParts;
 use crate::operator::FixedCopy;
 
@@ -20,6 +21,8 @@ const LEAST_SIZE: f64 = 0.1;
 pub(super) struct Range {
     /// Of every part: the diagonal of its box at rest, or of its prescribed positions if larger [m].
     size: Vec<f64>,
+    /// Boxes of the parts at rest.
+    rest: Vec<Bounds>,
     boxes: Vec<Bounds>,
 }
 
@@ -63,15 +66,35 @@ impl Range {
     /// prescribed.
     pub fn follow(&mut self, rest: &[Vector3<f64>], parts: &LooseParts, fixed: &[FixedCopy]) {
         self.measure(rest, parts);
+        self.rest.clone_from(&self.boxes);
+        self.find_sizes(rest, parts, fixed);
+    }
+
+    /// The same after a cut that made the copies `new` and left the parts as they were.
+    pub fn follow_new(
+        &mut self,
+        rest: &[Vector3<f64>],
+        new: &[NewCopy],
+        parts: &LooseParts,
+        fixed: &[FixedCopy],
+    ) {
+        for copy in new.iter().map(|new| new.copy as usize) {
+            self.rest[parts.of_copy[copy] as usize].add(&rest[copy]);
+        }
+        self.find_sizes(rest, parts, fixed);
+    }
+
+    fn find_sizes(&mut self, rest: &[Vector3<f64>], parts: &LooseParts, fixed: &[FixedCopy]) {
         self.size.clear();
-        self.size.extend(self.boxes.iter().map(Bounds::diagonal));
+        self.size.extend(self.rest.iter().map(Bounds::diagonal));
         let mut whole = Bounds::NOTHING;
-        for bounds in self.boxes.iter().filter(|bounds| bounds.diagonal() > 0.0) {
+        for bounds in self.rest.iter().filter(|bounds| bounds.diagonal() > 0.0) {
             whole.add(&bounds.low);
             whole.add(&bounds.high);
         }
         let least = LEAST_SIZE * whole.diagonal();
-        self.boxes.fill(Bounds::NOTHING);
+        self.boxes.clear();
+        self.boxes.resize(parts.len(), Bounds::NOTHING);
         for f in fixed {
             // Directions that are not prescribed have no known target; their rest position stands in.
             let rest = rest[f.copy as usize];

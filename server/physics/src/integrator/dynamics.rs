@@ -143,6 +143,15 @@ impl Dynamics {
         self.solver.rebuild(space)
     }
 
+    /// The same as [`follow_masses`](Self::follow_masses) after a cut that changed few of them, if that is enough.
+    pub fn reweigh(&mut self, space: &dyn Space, density_kg_m3: f64, mass: &mut Vec<f64>) -> bool {
+        let enough = self.solver.reweigh(space, density_kg_m3, mass);
+        if enough {
+            self.resize(mass.len());
+        }
+        enough
+    }
+
     /// Updates everything else that follows from the topology of `space` and from the masses [kg].
     pub fn follow_masses(&mut self, space: &dyn Space, mass: &[f64]) {
         self.solver.follow_masses(space, mass);

@@ -20,7 +20,7 @@ use crate::operator::{ElasticUpdate, Stiffness};
 use crate::solver::multigrid::{CoarsestSolve, CycleShape, LevelReport};
 use crate::solver::{Method, PcgSettings};
 use crate::space::Space;
-use crate::storage::reserve::refill;
+use crate::storage::reserve::{refill, resize_reserving};
 use crate::team::Team;
 
 /// A step that fails is tried again in 2 and then in 4 parts.
@@ -142,6 +142,14 @@ impl LinearlyImplicit {
     /// Stopping criteria of its linear solves.
     pub fn solver(&self) -> PcgSettings {
         self.pcg
+    }
+
+    /// Follows a change of the number of copies and of how they are joined.
+    fn follow_copies(&mut self, space: &dyn Space, n_copies: usize) {
+        self.step.resize(n_copies);
+        self.step.set_stiff_modes(space.stiff_modes());
+        self.step.set_method(self.method);
+        self.complete_levels(space);
     }
 
     /// Makes the levels of multigrid anew where they could not follow a cut.
@@ -283,10 +291,23 @@ impl StepSolver for LinearlyImplicit {
     fn follow_masses(&mut self, space: &dyn Space, mass: &[f64]) {
         refill(&mut self.mass_f32, mass.iter().map(|&m| m as f32));
         self.weightless = find_weightless(space, mass);
-        self.step.resize(mass.len());
-        self.step.set_stiff_modes(space.stiff_modes());
-        self.step.set_method(self.method);
-        self.complete_levels(space);
+        self.follow_copies(space, mass.len());
+    }
+
+    fn reweigh(&mut self, space: &dyn Space, density_kg_m3: f64, mass: &mut Vec<f64>) -> bool {
+        let Some(copies) = space.reweighed().filter(|_| self.weightless.is_empty()) else { return false };
+        let volumes = space.copy_volumes();
+        resize_reserving(mass, volumes.len(), 0.0);
+        resize_reserving(&mut self.mass_f32, volumes.len(), 0.0);
+        for copy in copies.iter().map(|&copy| copy as usize) {
+            mass[copy] = density_kg_m3 * volumes[copy];
+            self.mass_f32[copy] = mass[copy] as f32;
+        }
+        if copies.iter().any(|&copy| mass[copy as usize] <= WEIGHTLESS) {
+            return false;
+        }
+        self.follow_copies(space, mass.len());
+        true
     }
 
     fn lumped_masses(&self, space: &dyn Space, density_kg_m3: f64, mass: &mut Vec<f64>) {

@@ -29,7 +29,8 @@ impl LocalConnectivity {
     }
 
     /// Brings `parts` up to date after a cut, the last one of `space`, that made the copies `new`.
-    /// `mass` [kg] and `fixed` are those after it. The result is that of [`LooseParts::connected`].
+    /// `mass` [kg] and `fixed` are those after it. The result is that of [`LooseParts::connected`]. Returns whether the
+    /// parts are those from before.
     pub fn follow(
         &mut self,
         parts: &mut LooseParts,
@@ -37,16 +38,18 @@ impl LocalConnectivity {
         new: &[NewCopy],
         mass: &[f64],
         fixed: &[FixedCopy],
-    ) {
+    ) -> bool {
         resize_reserving(&mut parts.of_copy, mass.len(), 0);
         for new in new {
             parts.of_copy[new.copy as usize] = parts.of_copy[new.parent as usize];
         }
-        if self.holds(parts, space, new) {
+        let holds = self.holds(parts, space, new);
+        if holds {
             parts.measure(mass, fixed);
         } else {
             *parts = LooseParts::connected(|visit| space.for_groups(visit), mass, fixed);
         }
+        holds
     }
 
     /// Whether, in every part, the changed pieces connect all copies that the cut changed. No part has

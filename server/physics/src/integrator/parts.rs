@@ -61,9 +61,14 @@ impl LooseParts {
 
     /// Computes from the masses of the copies [kg] the mass of every part and whether it is free.
     pub(super) fn measure(&mut self, mass: &[f64], fixed: &[FixedCopy]) {
-        self.mass.fill(0.0);
-        for (&part, m) in self.of_copy.iter().zip(mass) {
-            self.mass[part as usize] += m;
+        match &mut self.mass[..] {
+            [one] => *one = sum(mass),
+            of_parts => {
+                of_parts.fill(0.0);
+                for (&part, m) in self.of_copy.iter().zip(mass) {
+                    of_parts[part as usize] += m;
+                }
+            }
         }
         self.free.clear();
         self.free.extend(self.mass.iter().map(|&m| m > 0.0));
@@ -86,6 +91,18 @@ impl LooseParts {
     pub fn any_free(&self) -> bool {
         self.free.contains(&true)
     }
+}
+
+/// Sum of these numbers, several at once.
+fn sum(numbers: &[f64]) -> f64 {
+    let (whole, rest) = numbers.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for eight in whole {
+        for (sum, number) in sums.iter_mut().zip(eight) {
+            *sum += number;
+        }
+    }
+    sums.iter().chain(rest).sum()
 }
 
 /// The three translation equations S t = b of every part.

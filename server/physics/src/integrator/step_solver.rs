@@ -103,6 +103,12 @@ pub trait StepSolver: Any + Debug + Send {
     /// Updates everything else that follows from the topology and from the masses [kg].
     fn follow_masses(&mut self, space: &dyn Space, mass: &[f64]);
 
+    /// The same after a cut that changed the masses of some copies alone, see [`Space::reweighed`]: these are computed
+    /// anew for a density [kg/m³]. Returns whether that was enough.
+    fn reweigh(&mut self, _space: &dyn Space, _density_kg_m3: f64, _mass: &mut Vec<f64>) -> bool {
+        false
+    }
+
     /// Lumped mass [kg] of every node, for a density [kg/m³].
     fn lumped_masses(&self, space: &dyn Space, density_kg_m3: f64, mass: &mut Vec<f64>);
 

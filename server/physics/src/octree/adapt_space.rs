@@ -25,6 +25,9 @@ impl OctreeSpace {
         self.changed.clone_from(&change.cells);
         self.only_cut = false;
         if change.divided > 0 {
+            if let Some(runs) = &mut self.runs {
+                runs.follow(&self.octree, &self.changed);
+            }
             self.epoch += 1;
             self.octree.follow_volumes(&change, &mut self.volumes);
             self.surface.follow(&self.octree, &self.changed, &[]);
@@ -68,6 +71,7 @@ impl OctreeSpace {
         if change.joined == 0 {
             return change;
         }
+        self.runs = None;
         self.epoch += 1;
         change.keep(&mut self.node_of_copy);
         let number = |vertex: u32| change.vertex_of[vertex as usize];

@@ -14,6 +14,7 @@ mod cubes;
 mod lattice;
 mod link_map;
 mod measures;
+mod near;
 mod restriction;
 mod shape;
 mod skin_faces;

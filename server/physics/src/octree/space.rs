@@ -10,6 +10,7 @@ use super::blade::swept_box;
 use super::cells::Octree;
 use super::change::OctreeChange;
 use super::link_map::{CutLink, LinkKey};
+use super::near::{LeafRuns, VertexBoxes};
 use super::surface::{OctreeSurface, OwnSkin};
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{
@@ -54,6 +55,8 @@ pub struct OctreeSpace {
     pub(super) volumes: Vec<f64>,
     /// Leaves that the last cut changed.
     pub(super) changed: Vec<u32>,
+    /// Vertices whose volume the last cut changed.
+    reweighed: Vec<u32>,
     /// Whether the last change was a cut, which leaves the numbers of all earlier leaves.
     pub(super) only_cut: bool,
     pub(super) fronts: BTreeMap<u32, Front>,
@@ -62,6 +65,9 @@ pub struct OctreeSpace {
     pub(super) own: Option<OwnSkin>,
     pub(super) epoch: u32,
     under_way: Option<(Vec<(LinkKey, CutLink)>, CutReport)>,
+    /// Made by the first cut after leaves got other numbers.
+    #[serde(skip)]
+    pub(super) runs: Option<LeafRuns>,
 }
 
 impl OctreeSpace {
@@ -74,12 +80,14 @@ impl OctreeSpace {
             node_of_copy: (0..n).collect(),
             volumes: Vec::new(),
             changed: Vec::new(),
+            reweighed: Vec::new(),
             only_cut: false,
             fronts: BTreeMap::new(),
             surface: OctreeSurface::default(),
             own: None,
             epoch: 0,
             under_way: None,
+            runs: None,
         };
         space.renew();
         space
@@ -97,6 +105,7 @@ impl OctreeSpace {
     }
 
     fn renew(&mut self) {
+        self.runs = None;
         self.volumes = self.octree.vertex_volumes();
         self.surface = OctreeSurface::build(&self.octree);
         if let Some(own) = &mut self.own {
@@ -109,16 +118,17 @@ impl OctreeSpace {
         &mut self,
         blade: &BladeSweep,
         incision: u32,
-        x: &[Vector3<f64>],
+        vertices: &VertexBoxes<'_>,
         (leaves, swept): (&[u32], &[Vector3<f64>; 2]),
     ) {
+        let x = vertices.positions();
         let Some(last) = blade.segments.last() else { return };
         let edge = [last[0].inf(&last[1]), last[0].sup(&last[1])];
         // The sweep ends at the last position, unless it has no triangles yet.
         let near = if (0..3).all(|k| swept[0][k] <= edge[0][k] && edge[1][k] <= swept[1][k]) {
             self.octree.leaves_near_of(leaves, x, &edge)
         } else {
-            self.octree.leaves_near(x, &edge)
+            self.leaves_near(vertices, &edge)
         };
         let near: Vec<[u32; 4]> = near.into_iter().flat_map(|id| self.tets_of(id)).collect();
         let around = |vertex: u32| {
@@ -166,12 +176,11 @@ impl OctreeSpace {
         if x.len() != expected {
             return Err(CutError::PositionCount { found: x.len(), expected });
         }
-        // Without an early end, so that several are examined at once.
-        let finite = |p: &Vector3<f64>| p.x.is_finite() & p.y.is_finite() & p.z.is_finite();
-        if !x.iter().fold(true, |all, p| all & finite(p)) {
+        let Some(vertices) = VertexBoxes::new(team, x) else {
+            let finite = |p: &Vector3<f64>| p.iter().all(|x| x.is_finite());
             let copy = x.iter().position(|p| !finite(p)).unwrap_or(0);
             return Err(CutError::NonFinitePosition { copy });
-        }
+        };
         let limit = MOST_GROWTH * self.initial.cells().len() + 100_000;
         let found = self.octree.cells().len();
         if found >= limit {
@@ -180,10 +189,15 @@ impl OctreeSpace {
         let triangles =
             sweep_from_behind(self.fronts.get(&incision), blade, x, BEHIND * self.octree.lattice().h);
         let swept = swept_box(&triangles);
-        let leaves = self.octree.leaves_near(x, &swept);
+        let leaves = self.leaves_near(&vertices, &swept);
         let cuts = self.octree.crossed_links_in(team, &leaves, x, (&triangles, incision));
-        self.remember(blade, incision, x, (&leaves, &swept));
+        self.remember(blade, incision, &vertices, (&leaves, &swept));
         Ok(cuts)
+    }
+
+    fn leaves_near(&mut self, vertices: &VertexBoxes<'_>, bounds: &[Vector3<f64>; 2]) -> Vec<u32> {
+        let runs = self.runs.get_or_insert_with(|| LeafRuns::new(&self.octree));
+        runs.leaves_near(&self.octree, vertices, bounds)
     }
 
     /// Enters the new vertices of `change`; `known` were there before.
@@ -220,6 +234,15 @@ impl OctreeSpace {
             }
         };
         team.run(&mut [&mut follow_volumes, &mut follow_surface]);
+        if let Some(runs) = &mut self.runs {
+            runs.follow(&self.octree, &change.cells);
+        }
+        let now = change.cells.iter().flat_map(|&id| self.octree.vertices()[id as usize]);
+        let all = change.earlier.iter().flat_map(|leaf| leaf.vertices).chain(now);
+        self.reweighed.clear();
+        self.reweighed.extend(all);
+        self.reweighed.sort_unstable();
+        self.reweighed.dedup();
         self.changed = change.cells;
         self.only_cut = true;
         self.epoch += u32::from(shows);
@@ -305,6 +328,10 @@ impl Space for OctreeSpace {
             return self.volumes.iter().map(|v| density_kg_m3 * v).collect();
         }
         self.octree.vertex_masses(density_kg_m3)
+    }
+
+    fn reweighed(&self) -> Option<&[u32]> {
+        (self.only_cut && self.octree.regions().is_empty()).then_some(&self.reweighed[..])
     }
 
     fn areas(&self, selected: &[bool]) -> Vec<f64> {
@@ -436,7 +463,12 @@ impl Space for OctreeSpace {
         let none = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
         let bounds = ends.fold(none, |[low, high], end| [low.inf(end), high.sup(end)]);
         let (mut corners, mut tets) = (Vec::new(), Vec::new());
-        for id in self.octree.leaves_near(x, &bounds) {
+        let boxes = self.runs.as_ref().and_then(|_| VertexBoxes::new(&mut Team::alone(), x));
+        let near = match (&self.runs, &boxes) {
+            (Some(runs), Some(boxes)) => runs.leaves_near(&self.octree, boxes, &bounds),
+            _ => self.octree.leaves_near(x, &bounds),
+        };
+        for id in near {
             let first = corners.len() as u32;
             corners.extend(self.octree.corners(id, x));
             tets.extend(TETS_OF_CUBE.map(|tet| tet.map(|c| first + c)));

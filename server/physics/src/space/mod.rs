@@ -152,6 +152,12 @@ pub trait Space: Any + Points + Send + Sync {
         self.copy_volumes().iter().map(|v| density_kg_m3 * v).collect()
     }
 
+    /// The copies whose mass the last change may have changed, where it was a cut that left the numbers and the masses of
+    /// all others, and the mass of a copy is the density times its [volume](Self::copy_volumes).
+    fn reweighed(&self) -> Option<&[u32]> {
+        None
+    }
+
     /// ∫ N_a dA [m²] over the skin faces all of whose nodes are `selected`, by node of the uncut body.
     fn areas(&self, selected: &[bool]) -> Vec<f64>;
 

@@ -5,9 +5,12 @@ use scindo_physics::body::{
     Arithmetic, Body, BodySettings, ElementKind, Method, Outcome, PcgSettings, Scheme,
 };
 use scindo_physics::cut::{BladeSweep, SolidCells};
+use scindo_physics::integrator::LooseParts;
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
 use scindo_physics::mesh::box_hexes;
 use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
+use scindo_physics::space::Space;
+use scindo_physics::team::Team;
 
 const LINEAR: Material = Material {
     young_pa: 1e6,
@@ -302,6 +305,30 @@ fn steps_have_the_same_bits_for_any_number_of_threads() {
     };
     assert_eq!(run(1), run(2));
     assert_eq!(run(1), run(3));
+}
+
+/// A cut brings masses and parts up to date around the blade alone.
+#[test]
+fn what_follows_a_cut_locally_is_what_follows_from_the_whole_body() {
+    let material = Material { law: Law::Corotational, young_pa: 1e5, ..LINEAR };
+    let mut space = OctreeSpace::new(unit_cube(12, 2));
+    let settings = BodySettings { method: Method::MgPcg, ..BodySettings::default() };
+    let mut body = body(unit_cube(12, 2), material, settings);
+    let mut parts = Vec::new();
+    for (incision, (at, depth)) in
+        (1..).zip([(0.31, 0.6), (0.48, 0.2), (0.48, -0.1), (0.77, 0.5), (0.2, -0.1)])
+    {
+        let edge = |z: f64| [Vector3::new(at, -0.1, z), Vector3::new(at + 0.05, 1.1, z)];
+        let blade = BladeSweep { segments: vec![edge(1.1), edge(depth)] };
+        body.cut(&blade, incision).unwrap();
+        space.cut(&mut Team::alone(), &space.rest_positions(), &blade, incision).unwrap();
+        let mass: Vec<f64> = space.octree().vertex_volumes().iter().map(|v| 1000.0 * v).collect();
+        assert_eq!(body.masses(), mass, "incision {incision}");
+        let whole = LooseParts::connected(|visit| space.for_groups(visit), &mass, &[]);
+        assert_eq!(*body.parts(), whole, "incision {incision}");
+        parts.push(whole.len());
+    }
+    assert_eq!(parts, [1, 1, 2, 2, 3]);
 }
 
 /// A cut divides leaves around the blade; undone at once, the body is as it was.
