@@ -155,6 +155,27 @@ fn for_cube(n: i32, mut visit: impl FnMut(At)) {
     }
 }
 
+/// Number of a cell along Morton's curve, whose coordinates are not negative.
+pub fn morton_code(at: At) -> u64 {
+    let [x, y, z] = at.map(|c| spread(c as u32));
+    x | y << 1 | z << 2
+}
+
+/// The lower 21 bits of `x`, two zeros between any two.
+fn spread(x: u32) -> u64 {
+    let mut x = u64::from(x) & 0x1f_ffff;
+    for (shift, mask) in [
+        (32, 0x1f_0000_0000_ffff),
+        (16, 0x1f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+        (2, 0x1249_2492_4924_9249),
+    ] {
+        x = (x | x << shift) & mask;
+    }
+    x
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -29,7 +29,7 @@ pub use build::Bits;
 pub use cells::{Cell, Octree, OctreeError};
 pub use change::{Leaf, OctreeChange};
 pub use coarsen::{Coarsening, Family};
-pub use lattice::{At, DIRECTIONS, Lattice, LeafMap, OUTSIDE, OctreeSettings};
+pub use lattice::{At, DIRECTIONS, Lattice, LeafMap, OUTSIDE, OctreeSettings, morton_code};
 pub use link_map::{CutLink, LinkHasher, LinkKey, LinkMap};
 pub use measures::Leaves;
 pub use restriction::Restriction;

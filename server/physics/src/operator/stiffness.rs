@@ -93,7 +93,7 @@ pub trait Stiffness: Any + Debug + Send + Sync {
     /// First half of a product with `x`.
     fn multiply(&mut self, team: &mut Team, x: &[Padded]);
 
-    /// The same with x ← z + β x, where x is that of the last product (nothing if β = 0).
+    /// The same with x ← z + β x, where x is that of the last product, which had a direction too (nothing if β = 0).
     fn multiply_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32);
 
     /// Second half: s K̂ x of the copies of block number `block`, added to `y`.

@@ -20,6 +20,8 @@ fn updates_and_products_do_not_allocate() {
     for law in [Law::Corotational, Law::Linear] {
         let with = ElasticUpdate { lame: Lame { mu: 4e4, lambda: 9e4 }, law, scale: 1e-4 };
         stiffness.update(&mut team, &with, &x);
+        // The first product with a direction makes room for it.
+        stiffness.multiply_direction(&mut team, &v, 0.0);
         let before = allocations();
         for k in 0..3 {
             x.iter_mut().for_each(|x| x.y += 0.01 * (5.0 * x.x + f64::from(k)).sin());

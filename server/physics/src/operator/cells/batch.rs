@@ -19,7 +19,7 @@ pub struct SectorBatch {
 }
 
 /// Batches are asked for so many turns before they are needed.
-const AHEAD: usize = 2;
+pub const AHEAD: usize = 4;
 
 /// Weights of hanging slots, in the order of [`HANGING_SLOTS`](super::lane::HANGING_SLOTS): ½ or ¼ where the slot hangs, 0 elsewhere.
 pub type HangingWeights = [Lanes; 6];

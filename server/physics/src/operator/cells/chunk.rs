@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::Matrix3;
+use smallvec::SmallVec;
 
 use super::super::Padded;
 use super::super::chunks::{NO_PIECE, pack};
@@ -16,7 +17,13 @@ use super::blocks::{self, BlockTable};
 use super::lane::{CellLane, CellMatrix, HANGING_SLOTS, frame, turned};
 use super::sectors::hanging_slots;
 use super::stored::{self, Entry, STORED, StoredBatch};
-use crate::element::{Halves, LANES, Lanes, Simd};
+use crate::element::{Halves, LANES, Lanes, Simd, prefetch};
+
+/// Vertices of the largest chunks, of 1024 cells that have none in common.
+pub const MOST_VERTICES: usize = 0x2000;
+
+/// A vector by local number. It is on the stack: one chunk after the other needs it, so it stays near the core.
+pub type LocalVector = SmallVec<[Padded; MOST_VERTICES]>;
 
 /// A table in the forms that the loops read.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -54,7 +61,7 @@ pub struct BatchLanes {
 pub struct CellChunk {
     /// Vertex of every local number, ascending.
     pub vertices: Vec<u32>,
-    /// Vector that the stiffness is applied to, by local number.
+    /// Vector of the last product with a direction, by local number; empty before the first one.
     pub x: Vec<Padded>,
     /// Batches of tables come before stored ones.
     pub groups: Vec<Group>,
@@ -82,10 +89,9 @@ impl CellChunk {
         for (k, cell) in cells.iter().enumerate() {
             kinds.entry((cell.matrix, cell.hanging != 0)).or_default().push(k);
         }
-        let n = vertices.len();
         let mut chunk = Self {
             vertices,
-            x: vec![[0.0; 4]; n],
+            x: Vec::new(),
             groups: Vec::new(),
             batches: Vec::new(),
             stored: Vec::new(),
@@ -145,10 +151,17 @@ impl CellChunk {
         self.groups.push(Group { matrix, batches, weights });
     }
 
-    /// y = s K̂ x; `y` has a row for every local number and perhaps more.
+    /// Asks for what a product reads first.
     #[inline(always)]
-    pub fn apply(&self, simd: Simd, tables: &[Table], y: &mut [Padded]) {
-        let y = &mut y[..self.x.len()];
+    pub fn ask_for_first(&self) {
+        prefetch(self.batches.get(..batch::AHEAD).unwrap_or(&self.batches));
+    }
+
+    /// y = s K̂ x; `x` has a row for every local number, and `y` perhaps more.
+    #[inline(always)]
+    pub fn apply(&self, simd: Simd, tables: &[Table], x: &[Padded], y: &mut [Padded]) {
+        assert!(x.len() == self.vertices.len());
+        let y = &mut y[..x.len()];
         y.fill([0.0; 4]);
         for group in &self.groups {
             let weights = &self.weights[group.weights.clone()];
@@ -158,20 +171,26 @@ impl CellChunk {
                 match group.matrix {
                     CellMatrix::Table(t) => {
                         let table = &tables[usize::from(t)].lanes;
-                        batch::multiply(simd, &self.batches[batches], weights, table, &self.x, y);
+                        batch::multiply(simd, &self.batches[batches], weights, table, x, y);
                     }
                     CellMatrix::Stored => {
-                        stored::multiply(simd, &self.stored[batches], weights, &self.x, y);
+                        stored::multiply(simd, &self.stored[batches], weights, x, y);
                     }
-                    CellMatrix::Half => stored::multiply(simd, &self.half[batches], weights, &self.x, y),
+                    CellMatrix::Half => stored::multiply(simd, &self.half[batches], weights, x, y),
                 }
             }
         }
     }
 
+    /// The vector of products with directions; the first one makes room for it.
+    pub fn room(&mut self) -> &mut [Padded] {
+        self.x.resize(self.vertices.len(), [0.0; 4]);
+        &mut self.x
+    }
+
     /// Diagonal blocks of s K̂, by local number.
     pub fn diagonals(&self, simd: Simd, tables: &[Table], rows: &mut [Block6]) {
-        let rows = &mut rows[..self.x.len()];
+        let rows = &mut rows[..self.vertices.len()];
         rows.fill([0.0; 8]);
         for group in &self.groups {
             let hanging = &self.hanging[group.weights.clone()];

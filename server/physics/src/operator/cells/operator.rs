@@ -12,12 +12,12 @@ use super::super::tet_batch::Block6;
 use super::super::{BLOCK, LinearOperator, Padded, block_of};
 use super::batch::TableLanes;
 use super::blocks::BlockTable;
-use super::chunk::{CellChunk, Given, Table};
+use super::chunk::{CellChunk, Given, LocalVector, Table};
 use super::lane::{CellLane, CellMatrix};
 use super::sectors::SectorTable;
 use super::stored::STORED;
 use crate::element::Simd;
-use crate::octree::Cell;
+use crate::octree::{Cell, morton_code};
 use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks, ranges};
 
@@ -187,7 +187,11 @@ impl CellOperator {
         let mut free: Vec<usize> =
             (0..self.chunks.len()).filter(|&k| self.chunks[k].vertices.is_empty()).collect();
         let mut renewed: Vec<usize> = left.iter().map(|(chunk, _)| *chunk).collect();
-        for chunk in arranged {
+        let directed = left.iter().any(|(_, chunk)| !chunk.x.is_empty());
+        for mut chunk in arranged {
+            if directed {
+                chunk.room();
+            }
             let room = |&k: &usize| self.gather.room(k) >= chunk.vertices.len();
             let at = match free.iter().position(room) {
                 Some(found) => free.remove(found),
@@ -243,26 +247,32 @@ impl CellOperator {
 
     /// First half of a product with `x`.
     pub fn multiply(&mut self, team: &mut Team, x: &[Padded]) {
-        self.for_chunks(team, |local, vertices| {
-            for (local, &vertex) in local.iter_mut().zip(vertices) {
-                *local = x[vertex as usize];
-            }
+        self.for_chunks(team, |simd, tables, chunk, y| {
+            chunk.ask_for_first();
+            let mut local = LocalVector::new();
+            local.extend(chunk.vertices.iter().map(|&vertex| x[vertex as usize]));
+            chunk.apply(simd, tables, &local, y);
         });
     }
 
-    /// The same with x ← z + β x, where x is that of the last product (nothing if β = 0).
+    /// The same with x ← z + β x, where x is that of the last product with a direction (nothing if β = 0).
     pub fn multiply_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32) {
-        self.for_chunks(team, |local, vertices| gather_direction(local, vertices, z, beta));
+        self.for_chunks(team, |simd, tables, chunk, y| {
+            chunk.ask_for_first();
+            chunk.room();
+            gather_direction(&mut chunk.x, &chunk.vertices, z, beta);
+            chunk.apply(simd, tables, &chunk.x, y);
+        });
     }
 
-    fn for_chunks(&mut self, team: &mut Team, fill: impl Fn(&mut [Padded], &[u32]) + Sync) {
+    fn for_chunks(
+        &mut self,
+        team: &mut Team,
+        multiply: impl Fn(Simd, &[Table], &mut CellChunk, &mut [Padded]) + Sync,
+    ) {
         let Self { simd, tables, chunks, gather, sums, .. } = self;
         let sums = ranges(sums, &gather.first_row);
-        team.for_blocks((blocks(chunks, 1), sums), |_, (chunk, y)| {
-            let CellChunk { x, vertices, .. } = &mut chunk[0];
-            fill(x, vertices);
-            chunk[0].apply(*simd, tables, y);
-        });
+        team.for_blocks((blocks(chunks, 1), sums), |_, (chunk, y)| multiply(*simd, tables, &mut chunk[0], y));
     }
 
     /// The part of the operator around `vertices`, ascending: the rows and columns of these. `cells` are all around
@@ -295,11 +305,12 @@ impl CellOperator {
         let Self { simd, tables, chunks, gather, sums, .. } = self;
         for (chunk, locals) in &patch.chunks {
             let held = &mut chunks[*chunk];
-            held.x.fill([0.0; 4]);
+            let room = held.room();
+            room.fill([0.0; 4]);
             for &(local, i) in &patch.locals[locals.clone()] {
-                held.x[local as usize] = x[i as usize];
+                room[local as usize] = x[i as usize];
             }
-            held.apply(*simd, tables, &mut sums[gather.first_row[*chunk] as usize..]);
+            held.apply(*simd, tables, &held.x, &mut sums[gather.first_row[*chunk] as usize..]);
         }
         for (y, ends) in y.iter_mut().zip(patch.first_row.windows(2)) {
             *y = [0.0; 4];
@@ -386,24 +397,6 @@ fn members(chunk: &CellChunk) -> Vec<u32> {
 /// Numbers of the cells along Morton's curve.
 pub fn morton_order(cells: &[Cell]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..cells.len() as u32).collect();
-    order.sort_by_cached_key(|&id| {
-        let at = cells[id as usize].at.map(|c| spread(c as u32));
-        (at[0] | at[1] << 1 | at[2] << 2, id)
-    });
+    order.sort_by_cached_key(|&id| (morton_code(cells[id as usize].at), id));
     order
-}
-
-/// The lower 21 bits of `x`, two zeros between any two.
-fn spread(x: u32) -> u64 {
-    let mut x = u64::from(x) & 0x1f_ffff;
-    for (shift, mask) in [
-        (32, 0x1f_0000_0000_ffff),
-        (16, 0x1f_0000_ff00_00ff),
-        (8, 0x100f_00f0_0f00_f00f),
-        (4, 0x10c3_0c30_c30c_30c3),
-        (2, 0x1249_2492_4924_9249),
-    ] {
-        x = (x | x << shift) & mask;
-    }
-    x
 }

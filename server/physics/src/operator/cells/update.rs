@@ -11,7 +11,7 @@ use super::batch::{
     Corners, HangingWeights, SectorBatch, TableLanes, distribute, from_cell, interpolate, multiply_sectors,
     part_of, read_matrix, read_weights, scatter, to_cell, transform,
 };
-use super::chunk::{BatchLanes, CellChunk, Table};
+use super::chunk::{BatchLanes, CellChunk, LocalVector, MOST_VERTICES, Table};
 use super::lane::{CellMatrix, handedness};
 use crate::element::{Batched, LANES, Lanes, Mat3, Simd, Vector8, for_eight, polar_newton, polar_rotation};
 use crate::octree::{At, Lattice};
@@ -25,9 +25,8 @@ pub struct RestChunk {
     sides: Vec<RestBatch>,
 }
 
-/// Positions [m] by local number. They are on the stack: an update needs them for one chunk after the other, and the
-/// largest chunks, of 1024 cells without a common vertex, have no more.
-type Positions = SmallVec<[[f64; 4]; 0x2000]>;
+/// Positions [m] by local number, as a [`LocalVector`].
+type Positions = SmallVec<[[f64; 4]; MOST_VERTICES]>;
 
 impl RestChunk {
     /// Bytes in use.
@@ -107,12 +106,11 @@ impl RestChunk {
     ) {
         let displacement = |k: usize| positions[chunk.vertices[k] as usize] - lattice.point(self.points[k]);
         let origin = if chunk.vertices.is_empty() { Vector3::zeros() } else { displacement(0) };
-        for (k, local) in chunk.x.iter_mut().enumerate() {
-            *local = padded(&(displacement(k) - origin));
-        }
-        chunk.apply(simd, tables, f);
+        let locals = (0..chunk.vertices.len()).map(|k| padded(&(displacement(k) - origin)));
+        let local: LocalVector = locals.collect();
+        chunk.apply(simd, tables, &local, f);
         let factor = 1.0 / scale;
-        f[..chunk.x.len()].as_flattened_mut().iter_mut().for_each(|f| *f *= factor);
+        f[..local.len()].as_flattened_mut().iter_mut().for_each(|f| *f *= factor);
     }
 }
 
