@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::cells::{Cell, Octree, OctreeError};
-use super::lattice::{At, Lattice, LeafMap, OUTSIDE, OctreeSettings, neighbours};
+use super::lattice::{At, Lattice, LeafMap, OUTSIDE, OctreeSettings, morton_code, neighbours};
 use super::link_map::CutLink;
 use super::shape::Shape;
 
@@ -151,19 +151,18 @@ impl Octree {
         let split = split_cells(&lattice, &fine);
         let mut cells = Vec::new();
         let root = 1i32 << lattice.levels;
+        // Leaves, and the vertices numbered with them, are near in memory where they are near in the body.
         let [nx, ny, nz] = lattice.size.map(|n| n as i32 / root);
-        for k in 0..nz {
-            for j in 0..ny {
-                for i in 0..nx {
-                    let at = [i * root, j * root, k * root];
-                    emit(at, lattice.levels, &split, &mut |at, level| {
-                        // A cell that is not split is inside or outside as a whole.
-                        if inside.has(at) {
-                            cells.push(Cell::new(at, level, material(at)));
-                        }
-                    });
+        let all = (0..nx * ny * nz).map(|n| [n % nx, n / nx % ny, n / (nx * ny)]);
+        let mut roots: Vec<At> = all.collect();
+        roots.sort_by_cached_key(|&at| morton_code(at));
+        for at in roots {
+            emit(at.map(|c| c * root), lattice.levels, &split, &mut |at, level| {
+                // A cell that is not split is inside or outside as a whole.
+                if inside.has(at) {
+                    cells.push(Cell::new(at, level, material(at)));
                 }
-            }
+            });
         }
         if cells.is_empty() {
             return Err(OctreeError::NoCell { h: lattice.h });
