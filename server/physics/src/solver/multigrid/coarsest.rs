@@ -54,6 +54,15 @@ pub struct Coarsest {
 impl Coarsest {
     /// Analyses the pattern of the coarsest level, if it is small enough.
     pub fn new(hierarchy: &Hierarchy) -> Self {
+        Self::reusing(Cholesky::default(), hierarchy)
+    }
+
+    /// The same in place of another one, in its memory: a cut within milliseconds would wait for new pages.
+    pub fn renew(&mut self, hierarchy: &Hierarchy) {
+        *self = Self::reusing(std::mem::take(&mut self.cholesky), hierarchy);
+    }
+
+    fn reusing(mut cholesky: Cholesky<f64>, hierarchy: &Hierarchy) -> Self {
         let Some(level) = hierarchy.levels.last().filter(|level| 3 * level.n_vertices <= COARSE_ENOUGH)
         else {
             return Self::default();
@@ -66,7 +75,6 @@ impl Coarsest {
         let place = |a: u32, b: u32| matrix.position(a as usize, b).map_or(0, |at| at as u32);
         let places =
             level.vertices.iter().map(|v| std::array::from_fn(|i| place(v[i / 8], v[i % 8]))).collect();
-        let mut cholesky = Cholesky::default();
         let analysed = cholesky.analyse(&matrix).is_ok();
         let n = level.n_vertices;
         Self {

@@ -236,7 +236,7 @@ impl Multigrid {
         galerkin.hold_coarse(hierarchy);
         self.forget_springs();
         if changes.last().is_some_and(|change| !change.moved.is_empty()) {
-            self.coarsest = Coarsest::new(&self.hierarchy);
+            self.coarsest.renew(&self.hierarchy);
         }
         self.partial.resize(self.hierarchy.levels[self.first].n_vertices.div_ceil(BLOCK), 0.0);
         changes.into_iter().zip(&mut self.cut).for_each(|(change, cut)| cut.extend(change.cells));
