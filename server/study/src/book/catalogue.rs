@@ -63,6 +63,8 @@ pub struct Number {
     pub from: Option<String>,
     /// The same in the quick form of the book, if it differs; empty if that measures something smaller.
     pub quick: Option<String>,
+    /// Where more is better: the same on fewer cores, for machines that do not have as many.
+    pub fewer_cores: Option<String>,
     /// Factor from the measured to the printed unit.
     #[serde(default = "one")]
     pub scale: f64,
@@ -100,6 +102,11 @@ impl Number {
     pub fn source(&self, quick: bool) -> Option<Vec<&str>> {
         let from = self.quick.as_ref().filter(|_| quick).or(self.from.as_ref())?;
         (!from.is_empty()).then(|| from.split(" / ").collect())
+    }
+
+    /// Where it is measured on fewer cores, in parts.
+    pub fn source_on_fewer_cores(&self) -> Option<Vec<&str>> {
+        self.fewer_cores.as_ref().map(|from| from.split(" / ").collect())
     }
 
     /// The command that measures it.

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::catalogue::Number;
+use super::catalogue::{Number, Paper};
 use super::part::Part;
 
 /// The reports of all parts that are there.
@@ -31,6 +31,12 @@ impl Measured {
         }
     }
 
+    /// One report alone.
+    #[cfg(test)]
+    pub fn of_report(part: &str, report: Value) -> Self {
+        Self { reports: BTreeMap::from([(part.to_owned(), report)]), ..Self::default() }
+    }
+
     /// Seconds that a part took, once it is finished.
     pub fn seconds(&self, part: &str) -> Option<f64> {
         self.seconds.get(part).copied()
@@ -46,14 +52,31 @@ impl Measured {
         self.reports.get(part)
     }
 
-    /// The measured value of a printed number, in its unit.
-    pub fn of(&self, number: &Number, quick: bool) -> Option<f64> {
-        let value = match number.source(quick)?[..] {
+    /// The measured value of a printed number, in its unit. One that was reached [on fewer
+    /// cores](Self::on_fewer_cores) counts, too.
+    pub fn of(&self, paper: &Paper, number: &Number, quick: bool) -> Option<f64> {
+        self.own(number, quick).or_else(|| self.on_fewer_cores(paper, number, quick))
+    }
+
+    /// The value on fewer cores than in the paper, where that is enough, and it was not measured on as many.
+    pub fn on_fewer_cores(&self, paper: &Paper, number: &Number, quick: bool) -> Option<f64> {
+        if self.own(number, quick).is_some() {
+            return None;
+        }
+        let value = self.at(&number.source_on_fewer_cores()?)? * number.scale;
+        (value >= number.bar(paper)).then_some(value)
+    }
+
+    fn own(&self, number: &Number, quick: bool) -> Option<f64> {
+        self.at(&number.source(quick)?).map(|value| value * number.scale)
+    }
+
+    fn at(&self, source: &[&str]) -> Option<f64> {
+        match *source {
             ["stress", case, figure] => self.figure(case, figure),
             [experiment, table, row, column] => self.cell(experiment, [table, row, column]),
             _ => None,
-        };
-        value.map(|value| value * number.scale)
+        }
     }
 
     /// A figure of a hard case.

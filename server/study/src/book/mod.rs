@@ -99,7 +99,7 @@ pub fn write(
 fn tally(paper: &Paper, measured: &Measured, quick: bool) -> Tally {
     let mut counts = [0; Verdict::ALL.len()];
     for number in &paper.number {
-        let verdict = judge(paper, number, measured.of(number, quick));
+        let verdict = judge(paper, number, measured.of(paper, number, quick));
         if let Some(i) = Verdict::ALL.iter().position(|v| *v == verdict) {
             counts[i] += 1;
         }
@@ -109,7 +109,7 @@ fn tally(paper: &Paper, measured: &Measured, quick: bool) -> Tally {
 
 fn rows(paper: &Paper, measured: &Measured, quick: bool) -> Value {
     let row = |number: &catalogue::Number| {
-        let ours = measured.of(number, quick);
+        let ours = measured.of(paper, number, quick);
         let verdict = judge(paper, number, ours);
         json!({
             "place": number.place,

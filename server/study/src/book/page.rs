@@ -85,7 +85,8 @@ pub fn paper(paper: &Paper, measured: &Measured, origin: &Origin, quick: bool) -
     }
     out += "</p>\n<p class=\"filter\">";
     for verdict in Verdict::ALL {
-        let count = paper.number.iter().filter(|n| judge(paper, n, measured.of(n, quick)) == verdict).count();
+        let count =
+            paper.number.iter().filter(|n| judge(paper, n, measured.of(paper, n, quick)) == verdict).count();
         let _ = write!(
             out,
             "<label><input type=\"checkbox\" checked value=\"{0}\"> <span class=\"verdict v{1}\">{0}</span> {count}</label>",
@@ -97,14 +98,15 @@ pub fn paper(paper: &Paper, measured: &Measured, origin: &Origin, quick: bool) -
             <th class=\"number\">paper</th><th class=\"number\">here</th><th class=\"number\">ratio</th>\
             <th class=\"number\">at equal cores</th><th>verdict</th><th>command</th></tr></thead>\n<tbody>\n";
     for number in &paper.number {
-        out += &row(paper, number, measured.of(number, quick), quick);
+        out += &row(paper, number, measured, quick);
     }
     out += "</tbody></table></div>\n";
     out += FILTER;
     wrap(&paper.title, &out)
 }
 
-fn row(paper: &Paper, number: &Number, ours: Option<f64>, quick: bool) -> String {
+fn row(paper: &Paper, number: &Number, measured: &Measured, quick: bool) -> String {
+    let ours = measured.of(paper, number, quick);
     let verdict = judge(paper, number, ours);
     let class = verdict_class(verdict);
     let ratio =
@@ -127,6 +129,9 @@ fn row(paper: &Paper, number: &Number, ours: Option<f64>, quick: bool) -> String
     );
     if !why.is_empty() && verdict != Verdict::Reproduced && verdict != Verdict::Better {
         let _ = write!(out, ": <span class=\"soft\">{}</span>", prose(why));
+    }
+    if measured.on_fewer_cores(paper, number, quick).is_some() {
+        out += ": <span class=\"soft\">on fewer cores</span>";
     }
     let command = number.command(quick).map_or(String::new(), |c| format!("<code>{}</code>", escape(&c)));
     let _ = writeln!(out, "</td><td>{command}</td></tr>");

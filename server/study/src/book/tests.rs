@@ -104,6 +104,44 @@ fn verdicts_follow_the_values() {
     assert_eq!(judge(&paper, &paper.number[1], None), Verdict::Refuted);
 }
 
+/// A number of elements that fewer cores reach is reached; one that they miss was not measured.
+#[test]
+fn fewer_cores_may_be_enough() {
+    let text = r#"
+        id = "a"
+        title = ""
+        authors = ""
+        year = 2000
+        machine = ""
+        core = 4.0
+        about = ""
+        [[number]]
+        place = ""
+        what = "elements on 4 cores"
+        printed = 10.0
+        unit = "count"
+        good = "more"
+        core_scales = true
+        from = "threads / Bar / 4 threads / elements"
+        fewer_cores = "threads / Bar / 2 threads / elements"
+    "#;
+    let paper: catalogue::Paper = toml::from_str(text).unwrap();
+    let number = &paper.number[0];
+    let measured = |rows: &[(&str, f64)]| {
+        let row = |(name, value): &(&str, f64)| json!({ "name": name, "printed": false, "values": [value] });
+        let rows: Vec<_> = rows.iter().map(row).collect();
+        let table = json!({ "title": "Bar", "columns": [{ "name": "elements" }], "rows": rows });
+        Measured::of_report("threads", json!({ "experiments": [{ "name": "threads", "tables": [table] }] }))
+    };
+    let found = |rows: &[(&str, f64)]| {
+        let measured = measured(rows);
+        (measured.of(&paper, number, false), measured.on_fewer_cores(&paper, number, false).is_some())
+    };
+    assert_eq!(found(&[("2 threads", 50.0)]), (Some(50.0), true));
+    assert_eq!(found(&[("2 threads", 30.0)]), (None, false));
+    assert_eq!(found(&[("2 threads", 50.0), ("4 threads", 30.0)]), (Some(30.0), false));
+}
+
 /// Every part can be run: its study or scene exists.
 #[test]
 fn every_part_exists() {
