@@ -195,6 +195,16 @@ impl OctreeSpace {
         Ok(cuts)
     }
 
+    /// Leaves that may meet the box between two corners [m] with the vertices at `x` [m], by the runs if there are any.
+    fn leaves_at(&self, x: &[Vector3<f64>], bounds: &[Vector3<f64>; 2]) -> Vec<u32> {
+        let by_runs = |runs: &LeafRuns| {
+            let vertices = VertexBoxes::new(&mut Team::alone(), x)?;
+            Some(runs.leaves_near(&self.octree, &vertices, bounds))
+        };
+        self.runs.as_ref().and_then(by_runs).unwrap_or_else(|| self.octree.leaves_near(x, bounds))
+    }
+
+    /// The same of a cut, which makes the runs if there are none.
     fn leaves_near(&mut self, vertices: &VertexBoxes<'_>, bounds: &[Vector3<f64>; 2]) -> Vec<u32> {
         let runs = self.runs.get_or_insert_with(|| LeafRuns::new(&self.octree));
         runs.leaves_near(&self.octree, vertices, bounds)
@@ -383,7 +393,7 @@ impl Space for OctreeSpace {
     ) {
         found.clear();
         let Some(bounds) = Bounds::of(points) else { return };
-        let near = self.octree.leaves_near(x, &bounds);
+        let near = self.leaves_at(x, &bounds);
         let tets: Vec<[u32; 4]> = near.into_iter().flat_map(|id| self.tets_of(id)).collect();
         found.extend(points.iter().map(|point| deepest_of(tets.iter().copied(), x, point, |_, _| true)));
     }
@@ -463,12 +473,7 @@ impl Space for OctreeSpace {
         let none = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
         let bounds = ends.fold(none, |[low, high], end| [low.inf(end), high.sup(end)]);
         let (mut corners, mut tets) = (Vec::new(), Vec::new());
-        let boxes = self.runs.as_ref().and_then(|_| VertexBoxes::new(&mut Team::alone(), x));
-        let near = match (&self.runs, &boxes) {
-            (Some(runs), Some(boxes)) => runs.leaves_near(&self.octree, boxes, &bounds),
-            _ => self.octree.leaves_near(x, &bounds),
-        };
-        for id in near {
+        for id in self.leaves_at(x, &bounds) {
             let first = corners.len() as u32;
             corners.extend(self.octree.corners(id, x));
             tets.extend(TETS_OF_CUBE.map(|tet| tet.map(|c| first + c)));
