@@ -304,13 +304,12 @@ impl CellOperator {
     pub fn multiply_patch(&mut self, patch: &Patch, x: &[Padded], y: &mut [Padded]) {
         let Self { simd, tables, chunks, gather, sums, .. } = self;
         for (chunk, locals) in &patch.chunks {
-            let held = &mut chunks[*chunk];
-            let room = held.room();
-            room.fill([0.0; 4]);
+            let held = &chunks[*chunk];
+            let mut local_x = LocalVector::from_elem([0.0; 4], held.vertices.len());
             for &(local, i) in &patch.locals[locals.clone()] {
-                room[local as usize] = x[i as usize];
+                local_x[local as usize] = x[i as usize];
             }
-            held.apply(*simd, tables, &held.x, &mut sums[gather.first_row[*chunk] as usize..]);
+            held.apply(*simd, tables, &local_x, &mut sums[gather.first_row[*chunk] as usize..]);
         }
         for (y, ends) in y.iter_mut().zip(patch.first_row.windows(2)) {
             *y = [0.0; 4];
