@@ -24,6 +24,6 @@ pub use material_point::{MOST_CARRIERS, MaterialPoint};
 pub use points::{Point, Points};
 pub use polar::polar_rotation;
 pub use polar_lanes::{Mat3, polar_newton};
-pub(crate) use prefetch::prefetch;
+pub(crate) use prefetch::{prefetch, prefetch_at};
 pub use spring::Spring;
 pub use tet4::{TET_EDGES, deformation_gradient, piece_energy, piece_forces};

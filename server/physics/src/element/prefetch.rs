@@ -18,3 +18,11 @@ pub fn prefetch<T: ?Sized>(value: &T) {
     #[cfg(not(target_arch = "x86_64"))]
     let _ = value;
 }
+
+/// Asks for an entry that is read soon, if there is one.
+#[inline(always)]
+pub fn prefetch_at<T>(entries: &[T], at: usize) {
+    if let Some(entry) = entries.get(at) {
+        prefetch(entry);
+    }
+}

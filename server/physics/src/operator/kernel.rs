@@ -8,7 +8,10 @@ use super::tet_lanes::{
     Three, UpdatedTet, edges, forces, load, read, scatter_block, sum_of_outer_products, tet_edges, update_tet,
 };
 use super::{Padded, strip_kernel};
-use crate::element::{Batched, Ids, LANES, Lanes, Simd, Vector8, prefetch};
+use crate::element::{Batched, Ids, LANES, Lanes, Simd, Vector8, prefetch, prefetch_at};
+
+/// Tets that are in no strip are asked for so many turns ahead; see [`strip_kernel::AHEAD`].
+const AHEAD: usize = 4;
 
 /// The batches of one chunk. Their local numbers are checked once, here.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -159,9 +162,6 @@ impl Batches {
     }
 }
 
-/// Tets that are in no strip are asked for so many turns ahead; see [`strip_kernel::AHEAD`].
-const AHEAD: usize = 4;
-
 // Loops instead of closures below: see `Vector`. Closures that only name a field are none of those.
 
 /// y += s K̂ x for tets that are in no strip.
@@ -174,7 +174,7 @@ fn apply_with<V: Batched<N>, const N: usize>(
 ) {
     let ratio = V::splat(ratio);
     for (k, b) in batches.iter().enumerate() {
-        prefetch(batches.get(k + AHEAD).unwrap_or(b));
+        prefetch_at(batches, k + AHEAD);
         // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
         let u = unsafe {
             [

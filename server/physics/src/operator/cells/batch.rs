@@ -4,7 +4,7 @@
 
 use super::super::Padded;
 use super::sectors::SectorTable;
-use crate::element::{Batched, Ids, LANES, Lanes, Mat3, Simd, Vector, Vector8, for_eight, prefetch};
+use crate::element::{Batched, Ids, LANES, Lanes, Mat3, Simd, Vector, Vector8, for_eight, prefetch_at};
 
 /// Eight cells with one table.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
@@ -96,9 +96,9 @@ unsafe fn multiply_with<V: Batched<N>, const N: usize, const HANGING: bool>(
     y: &mut [Padded],
 ) {
     for (b, batch) in batches.iter().enumerate() {
-        ask_for(batches, b + AHEAD / N);
+        prefetch_at(batches, b + AHEAD / N);
         if HANGING {
-            ask_for(weights, b + AHEAD / N);
+            prefetch_at(weights, b + AHEAD / N);
         }
         // Rotations act on components, all other steps on slots: they commute.
         // SAFETY: the caller's promise.
@@ -119,14 +119,6 @@ unsafe fn multiply_with<V: Batched<N>, const N: usize, const HANGING: bool>(
             // SAFETY: the caller's promise.
             unsafe { scatter(y, &batch[k].nodes, &part_of(&u, k)) };
         }
-    }
-}
-
-/// Asks for an entry that is needed soon, if there is one.
-#[inline(always)]
-fn ask_for<T>(entries: &[T], at: usize) {
-    if let Some(entry) = entries.get(at) {
-        prefetch(entry);
     }
 }
 
