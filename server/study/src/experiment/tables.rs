@@ -183,7 +183,7 @@ fn entry(name: &str, solid: Option<&dyn Shape>, quick: bool) -> Result<Entry, Tr
 /// Stiffness numbers with which three cycles reduce the error as printed.
 pub const S_BUNNY: f64 = 34_950.0;
 /// Likewise.
-pub const S_CUBE: f64 = 462.0;
+pub const S_CUBE: f64 = 970.0;
 /// Likewise.
 const S_ARMADILLO: f64 = 15_770.0;
 /// Likewise.

@@ -8,8 +8,9 @@ use super::follow::LevelChange;
 use super::galerkin::{Coefficients, Galerkin};
 use super::hierarchy::Hierarchy;
 use super::kernel::{LevelKernel, LevelSystem, noise};
+use super::lanczos::largest_ritz_value;
 use super::matrices::CellMatrix;
-use super::smoother::{Diagonal, Smoother, Smoothing, Stage, chebyshev, gauss_seidel, subtract};
+use super::smoother::{Diagonal, Smoother, Smoothing, Stage, chebyshev, degree_on, gauss_seidel, subtract};
 use super::stiff_springs::{Columns, SpringBlocks, Sprung};
 use crate::element::Simd;
 use crate::octree::Octree;
@@ -17,12 +18,10 @@ use crate::operator::{BLOCK, FixedCopy, Inverse3, LinearOperator, Padded, Spring
 use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
-/// Power iterations for the largest eigenvalue of D⁻¹A.
-const POWER_ITERATIONS: u32 = 10;
-/// The same after a cut: they may have to find a vector of few vertices.
-const LOCAL_ITERATIONS: u32 = 30;
+/// Lanczos iterations for the largest eigenvalue of D⁻¹A.
+const ITERATIONS: usize = 15;
 /// They estimate it from below; the smoother must not see a larger one.
-const SAFETY: f64 = 1.1;
+const SAFETY: f64 = 1.05;
 
 /// Settings of the cycles.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -103,7 +102,7 @@ pub struct Multigrid {
     /// Prescribed directions there.
     fixed: Vec<FixedCopy>,
     /// Whether λ has to be estimated anew.
-    estimate: bool,
+    stale: bool,
     /// Cells by level that cuts changed since λ was estimated.
     cut: Vec<Vec<u32>>,
     leaf_bounds: LeafBounds,
@@ -206,7 +205,7 @@ impl Multigrid {
             levels,
             first,
             fixed: Vec::new(),
-            estimate: true,
+            stale: true,
             cut: vec![Vec::new(); hierarchy.levels.len()],
             leaf_bounds: LeafBounds::default(),
             partial: vec![0.0; hierarchy.levels[first].n_vertices.div_ceil(BLOCK)],
@@ -269,7 +268,7 @@ impl Multigrid {
             }
         }
         coarsest.update(hierarchy, galerkin, updated.matrices, tolerance);
-        self.estimate |= updated.constants || updated.released;
+        self.stale |= updated.constants || updated.released;
     }
 
     /// Lets the cycles take these stiff `springs` of the operator of the finest level on all levels, after an update.
@@ -330,21 +329,20 @@ impl Multigrid {
         self.galerkin.is_made_for(with, fixed)
     }
 
-    /// Estimates the largest eigenvalue of D⁻¹A of every level by power iteration, if constants changed or prescribed
-    /// directions were released since the last time. `A` is the operator of the finest level and `inverse` has the
-    /// inverses of its diagonal blocks. After cuts the estimates [rise](Self::raise_eigenvalues) where that is
-    /// necessary.
+    /// Estimates the largest eigenvalue of D⁻¹A of every level if constants changed or prescribed directions were
+    /// released since the last time. `A` is the operator of the finest level and `inverse` has the inverses of its
+    /// diagonal blocks. After cuts the estimates [rise](Self::raise_eigenvalues) where that is necessary.
     pub fn estimate_eigenvalues(
         &mut self,
         team: &mut Team,
         A: &mut dyn LinearOperator,
         inverse: &[Inverse3],
     ) {
-        if std::mem::take(&mut self.estimate) {
+        if std::mem::take(&mut self.stale) {
             self.cut.iter_mut().for_each(Vec::clear);
             self.leaf_bounds.clear();
             for l in self.first..self.levels.len() {
-                self.power_iterations(team, (&mut *A, inverse), l, POWER_ITERATIONS);
+                self.estimate(team, (&mut *A, inverse), l, ITERATIONS);
             }
         } else if self.cut.iter().any(|cut| !cut.is_empty()) {
             self.raise_eigenvalues(team, A, inverse);
@@ -355,10 +353,11 @@ impl Multigrid {
     ///
     /// On the finest level a [bound](super::bounds) holds however the body is cut. On coarse levels a cut changes the
     /// equations of the vertices of touched cells alone, and A and D are sums over cells that stay the same elsewhere.
-    /// An eigenvalue above those before belongs to a vector around these vertices, and power iterations there find it
+    /// An eigenvalue above those before belongs to a vector around these vertices, and Lanczos iterations there find it
     /// as surely as those on all vertices: from below, with the same safety factor. That is no proof. A Chebyshev
-    /// polynomial of degree 2 still diminishes vectors up to 1.25 times the given eigenvalue; with the optimal weights
-    /// of the fourth kind the margin is another, which tests of random cuts show to be enough.
+    /// polynomial of the fourth kind still diminishes vectors somewhat above the given eigenvalue: up to 1.2 times with
+    /// degree 2, and 1.04 times with degree 8. Tests of random cuts show that estimates with the safety factor are not
+    /// below.
     fn raise_eigenvalues(&mut self, team: &mut Team, A: &mut dyn LinearOperator, inverse: &[Inverse3]) {
         for l in 0..self.levels.len() {
             let mut cells = std::mem::take(&mut self.cut[l]);
@@ -374,7 +373,7 @@ impl Multigrid {
                     self.levels[0].largest = known.max(bound);
                 }
             } else if l == self.first {
-                self.power_iterations(team, (&mut *A, inverse), l, POWER_ITERATIONS);
+                self.estimate(team, (&mut *A, inverse), l, ITERATIONS);
                 self.levels[l].largest = known.max(self.levels[l].largest);
             } else if let Vectors { kernel: Some(kernel), inverse, largest, .. } = &mut self.levels[l] {
                 let level = &self.hierarchy.levels[l];
@@ -383,63 +382,60 @@ impl Multigrid {
                 near.dedup();
                 // Where much was cut, products with the whole operator cost less.
                 if 2 * near.len() > level.n_vertices {
-                    self.power_iterations(team, (&mut *A, &[]), l, LOCAL_ITERATIONS);
+                    self.estimate(team, (&mut *A, &[]), l, ITERATIONS);
                     self.levels[l].largest = known.max(self.levels[l].largest);
                     continue;
                 }
                 let around = near.iter().flat_map(|&v| level.slots_of(v as usize)).map(|(id, _)| id as u32);
                 let mass = &self.galerkin.levels[l].mass;
-                let found = kernel.largest_near((around, &near), (mass, inverse), LOCAL_ITERATIONS);
+                let found = kernel.largest_near((around, &near), (mass, inverse), ITERATIONS);
                 *largest = known.max(SAFETY * found);
             }
         }
     }
 
-    /// Power iterations on level `l`, from the same vector each time.
-    fn power_iterations(
+    /// Estimates the largest eigenvalue of level `l`, from the same vector each time.
+    fn estimate(
         &mut self,
         team: &mut Team,
         (A, inverse): (&mut dyn LinearOperator, &[Inverse3]),
         l: usize,
-        iterations: u32,
+        iterations: usize,
     ) {
         let Self { galerkin, levels, fixed, partial, first, .. } = self;
         let Vectors { inverse: own, largest, r, d, q, kernel, .. } = &mut levels[l];
         let inverse = if l == *first { inverse } else { &own[..] };
-        (0_u32..).zip(d.iter_mut()).for_each(|(v, d)| *d = noise(v));
+        (0_u32..).zip(r.iter_mut()).for_each(|(v, r)| *r = noise(v));
         if l == *first {
-            filter(fixed, d);
+            filter(fixed, r);
         }
-        let partial = &mut partial[..d.len().div_ceil(BLOCK)];
-        let mut estimate: f64 = 0.0;
-        for _ in 0..iterations {
+        let partial = &mut partial[..r.len().div_ceil(BLOCK)];
+        q.fill([0.0; 4]);
+        let found = largest_ritz_value(iterations, |alpha, before| {
+            let state = (blocks(r, BLOCK), blocks(q, BLOCK), blocks(partial, 1));
+            team.for_blocks(state, |block, (r, z, partial)| {
+                for (r, q) in r.iter_mut().zip(&*z) {
+                    (0..4).for_each(|k| r[k] -= alpha * q[k]);
+                }
+                partial[0] = rows::precondition(block_of(inverse, block), r, z);
+            });
+            let product: f64 = partial.iter().sum();
+            let beta = if before > 0.0 { product / before } else { 0.0 } as f32;
+            let z = &*q;
+            team.for_blocks(blocks(d, BLOCK), |block, d| {
+                d.iter_mut().zip(block_of(z, block)).for_each(|(p, z)| rows::direction(p, z, beta));
+            });
             match kernel {
                 Some(kernel) => kernel.apply(team, &galerkin.levels[l].mass, d, q),
                 None => A.apply(team, d, q),
             }
-            // With q = A d and z = D⁻¹ q: λ ≈ qᵀz / qᵀd.
-            let (known, product) = (&*d, &*q);
-            team.for_blocks((blocks(r, BLOCK), blocks(partial, 1)), |block, (z, partial)| {
-                let q = block_of(product, block);
-                for (z, (q, M)) in z.iter_mut().zip(q.iter().zip(block_of(inverse, block))) {
-                    *z = M.times(q);
-                }
-                partial[0] = rows::dot(block_of(known, block), q);
-            });
-            let dq: f64 = partial.iter().sum();
-            let z = &*r;
+            let (p, q) = (&*d, &*q);
             team.for_blocks(blocks(partial, 1), |block, partial| {
-                partial[0] = rows::dot(block_of(product, block), block_of(z, block));
+                partial[0] = rows::dot(block_of(p, block), block_of(q, block));
             });
-            let qz: f64 = partial.iter().sum();
-            if !(dq > 0.0 && qz.is_finite()) {
-                break;
-            }
-            estimate = estimate.max(qz / dq);
-            let scale = (1.0 / qz.sqrt()) as f32;
-            d.iter_mut().zip(&*r).for_each(|(d, z)| *d = z.map(|z| scale * z));
-        }
-        *largest = if estimate > 0.0 { SAFETY * estimate } else { 1.0 };
+            [product, partial.iter().sum()]
+        });
+        *largest = if found > 0.0 { SAFETY * found } else { 1.0 };
     }
 
     /// z = V r: one cycle on A z = r from z = 0. `inverse` has the inverse diagonal blocks of A.
@@ -528,7 +524,8 @@ impl Multigrid {
         (b, x): (&[Padded], &mut [Padded]),
         before: bool,
     ) {
-        let Self { settings, hierarchy, galerkin, levels, .. } = self;
+        let Self { settings, hierarchy, galerkin, levels, first, .. } = self;
+        let first = *first;
         let operator = galerkin.operator(&hierarchy.levels[l], l);
         let Vectors { largest: known, r, d, q, kernel, columns, spring_blocks, .. } = &mut levels[l];
         let (columns, mass) = (&*columns, &galerkin.levels[l].mass[..]);
@@ -539,7 +536,7 @@ impl Multigrid {
         };
         match settings.smoother {
             Smoother::Chebyshev { degree } => {
-                let degree = u32::from(degree.clamp(1, 4));
+                let degree = degree_on(l - first, degree);
                 let sprung = (!columns.is_empty()).then_some(Sprung { columns, blocks: spring_blocks });
                 let diagonal = Diagonal { inverse, largest: largest.max(*known), sprung };
                 let stage = if before { Stage::Before } else { Stage::After };
@@ -598,7 +595,7 @@ impl Multigrid {
         }
     }
 
-    /// The largest eigenvalue of level `l` by many power iterations; the estimate stays.
+    /// The largest eigenvalue of level `l` by many iterations; the estimate stays.
     #[cfg(test)]
     pub(super) fn true_eigenvalue(
         &mut self,
@@ -608,7 +605,7 @@ impl Multigrid {
         l: usize,
     ) -> f64 {
         let known = self.levels[l].largest;
-        self.power_iterations(team, (A, inverse), l, 300);
+        self.estimate(team, (A, inverse), l, 300);
         std::mem::replace(&mut self.levels[l].largest, known) / SAFETY
     }
 

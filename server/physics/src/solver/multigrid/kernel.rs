@@ -5,6 +5,7 @@ use nalgebra::Matrix3;
 use super::dense::PLACES;
 use super::follow::LevelChange;
 use super::galerkin::Galerkin;
+use super::lanczos::largest_ritz_value;
 use super::level::Level;
 use super::matrices::{CellMatrix, LevelMatrices};
 use super::stiff_springs::Columns;
@@ -173,35 +174,32 @@ impl LevelKernel {
         });
     }
 
-    /// A bound from below of the largest eigenvalue of D⁻¹A by power iterations on the vertices `near`, ascending, with
-    /// all others held: the operator of these `cells` around them has changed. `inverse` is D⁻¹.
+    /// A bound from below of the largest eigenvalue of D⁻¹A on the vertices `near`, ascending, with all others held: the
+    /// operator of these `cells` around them has changed. `inverse` is D⁻¹.
     pub fn largest_near(
         &mut self,
         (cells, near): (impl Iterator<Item = u32>, &[u32]),
         (mass, inverse): (&[f32], &[Inverse3]),
-        iterations: u32,
+        iterations: usize,
     ) -> f64 {
         let patch = self.operator.patch(cells, near);
-        let mut x: Vec<Padded> = near.iter().map(|&v| noise(v)).collect();
-        let mut y = x.clone();
-        let mut estimate: f64 = 0.0;
-        for _ in 0..iterations {
-            self.operator.multiply_patch(&patch, &x, &mut y);
-            let (mut xy, mut yz) = (0.0, 0.0);
-            for ((x, y), &v) in x.iter_mut().zip(&mut y).zip(near) {
-                (0..4).for_each(|k| y[k] += mass[v as usize] * x[k]);
-                xy += rows::dot(std::slice::from_ref(x), std::slice::from_ref(y));
-                *x = inverse[v as usize].times(y);
-                yz += rows::dot(std::slice::from_ref(x), std::slice::from_ref(y));
+        let mut r: Vec<Padded> = near.iter().map(|&v| noise(v)).collect();
+        let mut q = vec![[0.0; 4]; near.len()];
+        let (mut z, mut p) = (q.clone(), q.clone());
+        largest_ritz_value(iterations, |alpha, before| {
+            for ((r, q), (z, &v)) in r.iter_mut().zip(&q).zip(z.iter_mut().zip(near)) {
+                (0..4).for_each(|k| r[k] -= alpha * q[k]);
+                *z = inverse[v as usize].times(r);
             }
-            if !(xy > 0.0 && yz.is_finite()) {
-                break;
+            let product = rows::dot(&r, &z);
+            let beta = if before > 0.0 { product / before } else { 0.0 } as f32;
+            p.iter_mut().zip(&z).for_each(|(p, z)| rows::direction(p, z, beta));
+            self.operator.multiply_patch(&patch, &p, &mut q);
+            for ((q, p), &v) in q.iter_mut().zip(&p).zip(near) {
+                (0..4).for_each(|k| q[k] += mass[v as usize] * p[k]);
             }
-            estimate = estimate.max(yz / xy);
-            let scale = (1.0 / yz.sqrt()) as f32;
-            x.iter_mut().flatten().for_each(|x| *x *= scale);
-        }
-        estimate
+            [product, rows::dot(&p, &q)]
+        })
     }
 
     /// y = A x, with the lumped `mass` of every vertex.
@@ -256,7 +254,7 @@ impl LinearOperator for LevelSystem<'_> {
     }
 }
 
-/// Numbers between −1 and 1 that depend on a vertex: where power iterations start.
+/// Numbers between −1 and 1 that depend on a vertex: where estimates of eigenvalues start.
 pub fn noise(v: u32) -> Padded {
     let number = |k: u32| (v.wrapping_mul(3).wrapping_add(k)).wrapping_mul(2_654_435_761) >> 8;
     [0, 1, 2, 3].map(|k| if k < 3 { number(k) as f32 / (1 << 23) as f32 - 1.0 } else { 0.0 })

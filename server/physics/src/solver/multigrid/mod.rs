@@ -23,6 +23,7 @@ mod galerkin;
 mod inner;
 mod touched;
 mod operator;
+mod lanczos;
 mod kernel;
 mod smoother;
 mod bounds;

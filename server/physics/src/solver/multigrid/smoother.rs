@@ -14,10 +14,11 @@ use crate::team::{Team, blocks};
 /// How a cycle smooths, before and after the correction by the coarser level.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Smoother {
-    /// Chebyshev polynomial of the fourth kind in D⁻¹A, D the 3×3 diagonal blocks, of this degree: 1 … 4.
-    /// Symmetric, and the same on any number of threads.
+    /// Chebyshev polynomial of the fourth kind in D⁻¹A, D the 3×3 diagonal blocks. Symmetric, and the same on any
+    /// number of threads.
     Chebyshev {
-        /// Products with A per smoothing.
+        /// Products with A per smoothing, 1 … 8. Coarse levels have more: 2, 4, 8 on the first, second, and all others.
+        /// They cost little there, and make up for parts between cuts that coarse cells make too stiff.
         degree: u8,
     },
     /// Gauss–Seidel sweeps by vertex, forward both times, on one thread: for comparison. The cycle is not
@@ -36,12 +37,54 @@ impl Default for Smoother {
     }
 }
 
+/// The highest degree of a Chebyshev smoother.
+const HIGHEST: u32 = 8;
+
+/// Degree of the Chebyshev smoother `below` levels below the one that is solved on, where it is `degree`.
+pub fn degree_on(below: usize, degree: u8) -> u32 {
+    u32::from(degree).max(1 << below.min(3)).min(HIGHEST)
+}
+
 /// Optimal weights β by degree.
-const WEIGHTS: [&[f64]; 4] = [
+const WEIGHTS: [&[f64]; HIGHEST as usize] = [
     &[1.125],
     &[1.023_872_875_703_13, 1.264_089_053_710_85],
     &[1.008_425_447_820_28, 1.088_678_392_087_30, 1.337_531_259_096_18],
     &[1.003_913_104_272_85, 1.040_358_111_885_93, 1.148_634_985_462_54, 1.382_688_692_410_00],
+    &[
+        1.002_129_301_461_65,
+        1.021_737_115_492_61,
+        1.078_724_331_926_03,
+        1.198_100_652_926_63,
+        1.413_225_427_916_82,
+    ],
+    &[
+        1.001_285_172_559_40,
+        1.013_042_930_352_33,
+        1.046_782_151_241_13,
+        1.116_164_894_196_76,
+        1.238_290_202_184_44,
+        1.435_242_971_067_45,
+    ],
+    &[
+        1.000_834_643_979_12,
+        1.008_439_494_301_23,
+        1.030_087_077_687_14,
+        1.074_083_840_920_03,
+        1.150_361_867_073_66,
+        1.271_164_740_461_40,
+        1.451_866_586_493_64,
+    ],
+    &[
+        1.000_572_466_311_98,
+        1.005_774_276_624_15,
+        1.020_501_879_229_42,
+        1.050_198_034_445_66,
+        1.101_155_729_849_41,
+        1.180_860_428_068_58,
+        1.298_385_853_825_75,
+        1.464_860_731_511_01,
+    ],
 ];
 
 /// β of step `i` of `degree`; 1 for degrees without a table.
@@ -210,7 +253,7 @@ mod tests {
     /// Optimal weights make the maxima of λ p(λ)²/(1 − p(λ)²) on [0, 1] equal.
     #[test]
     fn weights_are_optimal() {
-        for degree in 1..=4_u32 {
+        for degree in 1..=HIGHEST {
             let value = |lambda: f64| {
                 let (mut x, mut r, mut d) = (0.0, 1.0, 0.0);
                 for i in 0..degree {
