@@ -214,7 +214,7 @@ fn measure(entry: &Entry, tables: &mut Tables) -> Result<(), Trouble> {
         (sor.0, sor.1, false),
         (chebyshev.0, chebyshev.1, false),
         ("Chebyshev in CG", chebyshev.1, true),
-        ("Chebyshev of degree 1 in CG", Smoother::Chebyshev { degree: 1 }, true),
+        ("Chebyshev of degree 1 in CG", Smoother::Chebyshev { degree: 1, most: 8 }, true),
     ];
     let mut runs = Vec::new();
     let mut until = Until { iterations: PATIENCE, error: 1.0, seconds: 0.0 };

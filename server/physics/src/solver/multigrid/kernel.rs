@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 use super::dense::PLACES;
 use super::follow::LevelChange;
 use super::galerkin::Galerkin;
-use super::lanczos::largest_ritz_value;
+use super::lanczos::{factor, largest_ritz_value};
 use super::level::Level;
 use super::matrices::{CellMatrix, LevelMatrices};
 use super::stiff_springs::Columns;
@@ -192,7 +192,7 @@ impl LevelKernel {
                 *z = inverse[v as usize].times(r);
             }
             let product = rows::dot(&r, &z);
-            let beta = if before > 0.0 { product / before } else { 0.0 } as f32;
+            let beta = factor(product, before) as f32;
             p.iter_mut().zip(&z).for_each(|(p, z)| rows::direction(p, z, beta));
             self.operator.multiply_patch(&patch, &p, &mut q);
             for ((q, p), &v) in q.iter_mut().zip(&p).zip(near) {

@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-10;
 /// to 0.
 ///
 /// `iterate` is given α and the zᵀr of the iteration before, both 0 at first, and does r ← r − αq, z = D⁻¹r,
-/// p ← z + βp with β = zᵀr over the one before, and q = Ap. It returns zᵀr and pᵀq.
+/// p ← z + βp with β the [`factor`] of both, and q = Ap. It returns zᵀr and pᵀq.
 pub fn largest_ritz_value(iterations: usize, mut iterate: impl FnMut(f32, f64) -> [f64; 2]) -> f64 {
     let mut rows = Vec::with_capacity(iterations);
     let mut last = 0.0;
@@ -27,12 +27,17 @@ pub fn largest_ritz_value(iterations: usize, mut iterate: impl FnMut(f32, f64) -
         if before == 0.0 {
             least = ROUNDING * product;
         }
-        let beta = if before > 0.0 { product / before } else { 0.0 };
+        let beta = factor(product, before);
         let inverse = curvature / product;
         rows.push(Row { diagonal: inverse + beta * last, beside: beta * last * last });
         (alpha, before, last) = (product / curvature, product, inverse);
     }
     largest(&rows)
+}
+
+/// β: zᵀr over the one `before`; 0 at first.
+pub fn factor(product: f64, before: f64) -> f64 {
+    if before > 0.0 { product / before } else { 0.0 }
 }
 
 /// A row of a symmetric tridiagonal matrix: its diagonal entry, and the square of the one to its left.
@@ -75,7 +80,7 @@ mod tests {
         largest_ritz_value(iterations, |alpha, before| {
             r -= &q * f64::from(alpha);
             let product = r.norm_squared();
-            p = &r + if before > 0.0 { product / before } else { 0.0 } * &p;
+            p = &r + factor(product, before) * &p;
             q = &A * &p;
             [product, p.dot(&q)]
         })

@@ -17,9 +17,11 @@ pub enum Smoother {
     /// Chebyshev polynomial of the fourth kind in D⁻¹A, D the 3×3 diagonal blocks. Symmetric, and the same on any
     /// number of threads.
     Chebyshev {
-        /// Products with A per smoothing, 1 … 8. Coarse levels have more: 2, 4, 8 on the first, second, and all others.
-        /// They cost little there, and make up for parts between cuts that coarse cells make too stiff.
+        /// Products with A per smoothing, 1 … 8.
         degree: u8,
+        /// Coarse levels have more, 2, 4, 8 on the first, second, and all others, but no more than this. They cost little
+        /// there, and make up for parts between cuts that coarse cells make too stiff.
+        most: u8,
     },
     /// Gauss–Seidel sweeps by vertex, forward both times, on one thread: for comparison. The cycle is not
     /// symmetric, and springs are not smoothed.
@@ -33,16 +35,18 @@ pub enum Smoother {
 
 impl Default for Smoother {
     fn default() -> Self {
-        Self::Chebyshev { degree: 2 }
+        Self::Chebyshev { degree: 2, most: HIGHEST as u8 }
     }
 }
 
 /// The highest degree of a Chebyshev smoother.
 const HIGHEST: u32 = 8;
 
-/// Degree of the Chebyshev smoother `below` levels below the one that is solved on, where it is `degree`.
-pub fn degree_on(below: usize, degree: u8) -> u32 {
-    u32::from(degree).max(1 << below.min(3)).min(HIGHEST)
+/// Degree of the Chebyshev smoother `below` levels below the one that is solved on, where it is `degree`; `most` as in
+/// [`Smoother::Chebyshev`].
+pub fn degree_on(below: usize, degree: u8, most: u8) -> u32 {
+    let more = (1 << below.min(3)).min(u32::from(most));
+    u32::from(degree.max(1)).max(more).min(HIGHEST)
 }
 
 /// Optimal weights β by degree.
