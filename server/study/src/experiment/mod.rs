@@ -32,6 +32,8 @@ mod tables;
 
 mod convergence;
 
+mod over_stiffness;
+
 mod solvers;
 
 mod layer;

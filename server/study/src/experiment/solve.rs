@@ -16,6 +16,10 @@ type V = Vector3<f64>;
 
 /// Single precision can reduce errors no further than about this.
 pub const FLOOR: f64 = 3e-6;
+/// Largest residual of a solution by which errors are measured.
+pub const CONVERGED: f64 = 1e-7;
+/// Iterations at most: of conjugate gradients alone, with SOR cycles and with Chebyshev cycles.
+pub const PATIENCE: [usize; 3] = [8_000, 60, 200];
 
 /// Errors over time.
 #[derive(Clone, Debug, Default)]

@@ -1,27 +1,19 @@
 //! Figure 12: error over time of direct and iterative solvers, their initialisation included.
 
 use super::model::{CUBE, Cuts, Grid, Model, animal, cube};
-use super::solve::{Course, FLOOR, Solver, Until, cholesky, run};
+use super::over_stiffness;
+use super::solve::{CONVERGED, Course, FLOOR, PATIENCE, Solver, Until, cholesky, run};
 use super::system::{Problem, System, norm, smoothers};
 use super::tables::{S_BUNNY_2, S_BUNNY_3, S_CUBE};
 use super::{ExperimentBench, ExperimentResult, Plots, Table, Trouble, Unit};
 use crate::page::plot::{Mark, Plot};
-use crate::stress::chart::{Chart, Line};
-use scindo_physics::solver::multigrid::Smoother;
 
-/// Iterations at most: of conjugate gradients alone, with SOR cycles and with Chebyshev cycles.
-const PATIENCE: [usize; 3] = [8_000, 60, 200];
-/// Largest residual of a solution by which errors are measured.
-const CONVERGED: f64 = 1e-7;
 /// Least error that is drawn.
 const LEAST: f64 = 1e-6;
 /// Points of a curve at most.
 const POINTS: usize = 60;
 /// Cells up to which a factorisation is tried, in a full study and in a quick one.
 const DIRECT: [usize; 2] = [45_000, 12_000];
-/// Stiffness numbers from much mass to little, and errors to which times are compared.
-const STIFFNESS: [f64; 6] = [1e2, 1e3, 1e4, 1e5, 1e6, 1e7];
-const RATIOS: [f64; 2] = [0.1, 1e-3];
 /// Names of the solvers, in the order of their colours.
 const NAMES: [&str; 6] =
     ["Cholesky", "CG, block-Jacobi", "MG, SOR", "MG, Chebyshev", "CG with MG, Chebyshev", "CG with MG, SOR"];
@@ -68,7 +60,7 @@ pub fn solvers(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trou
         models.push((cube(CUBE, 4, Grid::Rotated)?, S_CUBE));
     }
     let direct = DIRECT[usize::from(bench.is_quick())];
-    let total = 2 * models.len();
+    let total = 2 * models.len() + over_stiffness::measurements(bench.is_quick());
     for (model, s) in &models {
         let mut plots =
             Plots { caption: format!("{}: left with mass, right without.", model.name), ..Plots::default() };
@@ -86,68 +78,8 @@ pub fn solvers(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trou
         result.plots.push(plots);
     }
     result.tables.push(table);
-    over_stiffness(bench, &mut result)?;
+    over_stiffness::ratios(bench, &mut result, total)?;
     Ok(result)
-}
-
-/// The ratio of the times of conjugate gradients with block-Jacobi and with multigrid, from much mass to little.
-fn over_stiffness(bench: &mut ExperimentBench<'_>, result: &mut ExperimentResult) -> Result<(), Trouble> {
-    let mut table = Table::new(
-        "From much mass to little",
-        "Seconds until ‖e‖/‖e₀‖ has fallen so far, with and without multigrid inside conjugate gradients, and how \
-         many times longer it takes without. Operators of the coarse levels are included; levels, which only a cut \
-         needs, are not.",
-        &[
-            ("s", Unit::Number),
-            ("multigrid, to 0.1", Unit::Seconds),
-            ("block-Jacobi, to 0.1", Unit::Seconds),
-            ("ratio", Unit::Times),
-            ("multigrid, to 1e-3", Unit::Seconds),
-            ("block-Jacobi, to 1e-3", Unit::Seconds),
-            ("ratio", Unit::Times),
-        ],
-    );
-    let mut chart = Chart::new("block-Jacobi over multigrid", "log₁₀ s", "times as long");
-    let model = if bench.is_quick() {
-        animal(None, 39, 2, Cuts::Curved)?
-    } else {
-        animal(None, 155, 4, Cuts::Curved)?
-    };
-    let cut = model.cut()?;
-    let mut lines = RATIOS.map(|to| Line { name: format!("to {to}"), points: Vec::new() });
-    for s in STIFFNESS {
-        bench.begin(format!("{}, s = {s:e}", model.name), STIFFNESS.len())?;
-        let mut system = System::new(cut.space.octree(), (model.held, model.pull), Problem::Step(s))?;
-        let (exact, left) = system.converged();
-        if left.is_nan() || left > CONVERGED {
-            continue;
-        }
-        let until = |iterations| Until { iterations, error: RATIOS[1], seconds: 0.0 };
-        let (mut multigrid, seconds) = system.multigrid(Smoother::default());
-        let own = run(&mut system, Solver::of(&mut multigrid, true), &exact, until(PATIENCE[2]));
-        drop(multigrid);
-        let other = run(&mut system, Solver::Jacobi, &exact, until(PATIENCE[0]));
-        let mut values = vec![Some(s)];
-        for (to, line) in RATIOS.into_iter().zip(&mut lines) {
-            let own = own.seconds_to(to).map(|t| seconds.coarse + t);
-            let other = other.seconds_to(to);
-            let ratio = own.zip(other).map(|(own, other)| other / own);
-            values.extend([own, other, ratio]);
-            line.points.extend(ratio.map(|ratio| [s.log10(), ratio]));
-        }
-        table.row(model.name.clone(), &values);
-    }
-    chart.lines.extend(lines);
-    result.tables.push(table);
-    result.plots.push(Plots {
-        caption: format!(
-            "{}: the paper has 7.5 times to 0.1, at a stiffness number that it does not print.",
-            model.name
-        ),
-        charts: vec![chart],
-        ..Plots::default()
-    });
-    Ok(())
 }
 
 /// The errors of all solvers; the residual of the solution if this is not converged.

@@ -20,7 +20,7 @@ const MODELS: [&str; 5] = ["Bunny", "Cube", "Armadillo", "Bunny 2", "Bunny 3"];
 const SMALL: [&str; 2] = ["Bunny 3", "Bunny 2"];
 /// Finest cells across the animals that have as many cells after the cut as the armadillo, and before it as the solid of
 /// figure 13.
-const ARMADILLO: u32 = 283;
+pub const ARMADILLO_ACROSS: u32 = 283;
 const SLICED: u32 = 260;
 
 /// Memory of a uniform grid with all that a step needs [bytes per cell].
@@ -169,7 +169,7 @@ fn entry(name: &str, solid: Option<&dyn Shape>, quick: bool) -> Result<Entry, Tr
         "Bunny" => of(printed::BUNNY, 155, 4, S_BUNNY),
         "Bunny 2" => of(printed::BUNNY_2, 77, 3, S_BUNNY_2),
         "Bunny 3" => of(printed::BUNNY_3, 39, 2, S_BUNNY_3),
-        "Armadillo" => of(printed::ARMADILLO, ARMADILLO, 5, S_ARMADILLO),
+        "Armadillo" => of(printed::ARMADILLO, ARMADILLO_ACROSS, 5, S_ARMADILLO),
         _ => Ok(Entry {
             printed: printed::CUBE,
             adaptive: cube(CUBE, 4, Grid::Rotated)?,
