@@ -48,7 +48,9 @@ impl LinearOperator for SystemOperator<'_> {
         self.elastic.multiply(team, x);
         let A = &*self;
         team.for_blocks(blocks(y, BLOCK), |block, y| A.without_springs(block, block_of(x, block), y));
-        self.springs.iter().for_each(|spring| spring.add_to(x, y));
+        for spring in self.springs {
+            spring.add_to(x, y);
+        }
         filter(self.fixed, y);
     }
 
@@ -76,8 +78,7 @@ impl LinearOperator for SystemOperator<'_> {
         team.for_blocks(state, |block, (p, q, partial)| {
             partial[0] = elastic.advance(block, &with, p, q);
         });
-        let springs: f64 = self.springs.iter().map(|spring| spring.curvature(p)).sum();
-        self.springs.iter().for_each(|spring| spring.add_to(p, q));
+        let springs: f64 = self.springs.iter().map(|spring| spring.add_to(p, q)).sum();
         filter(self.fixed, q); // p is 0 there
         partial.iter().sum::<f64>() + springs
     }
@@ -139,31 +140,24 @@ impl Spring {
         T.gather(row);
     }
 
-    /// k (n·p)² or k |p|² of the point's displacement p.
-    fn curvature(&self, x: &[Padded]) -> f64 {
-        let p = self.moved(x).map(f64::from);
-        let squared = match self.direction {
-            Some(n) => (0..3).map(|i| f64::from(n[i]) * p[i]).sum::<f64>().powi(2),
-            None => p.iter().map(|p| p * p).sum(),
-        };
-        f64::from(self.stiffness) * squared
-    }
-
-    /// y += k J Jᵀ x.
-    pub fn add_to(&self, x: &[Padded], y: &mut [Padded]) {
+    /// y += k J Jᵀ x. Returns xᵀ k J Jᵀ x, which is k (n·p)² or k |p|² of the point's displacement p.
+    #[inline]
+    pub fn add_to(&self, x: &[Padded], y: &mut [Padded]) -> f64 {
         let p = self.moved(x);
-        let f = match self.direction {
+        let dot = |n: &[f32; 3]| (0..3).map(|i| f64::from(n[i]) * f64::from(p[i])).sum::<f64>();
+        let (f, squared) = match &self.direction {
             Some(n) => {
                 let along = self.stiffness * (n[0] * p[0] + n[1] * p[1] + n[2] * p[2]);
-                n.map(|n| along * n)
+                (n.map(|n| along * n), dot(n).powi(2))
             }
-            None => p.map(|p| self.stiffness * p),
+            None => (p.map(|p| self.stiffness * p), dot(&p)),
         };
         for (copy, w) in self.point.carriers() {
             for (y, f) in y[copy].iter_mut().zip(&f) {
                 *y += w * f;
             }
         }
+        f64::from(self.stiffness) * squared
     }
 }
 

@@ -233,7 +233,9 @@ impl LinearOperator for Fine {
     fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
         let Self { hierarchy, galerkin, products, fixed, springs, .. } = self;
         galerkin.operator(&hierarchy.levels[0], 0).apply(team, x, y, products);
-        springs.iter().for_each(|spring| spring.add_to(x, y));
+        for spring in springs {
+            spring.add_to(x, y);
+        }
         filter(fixed, y);
     }
 }
