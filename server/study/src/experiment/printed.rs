@@ -18,6 +18,13 @@ pub struct Printed {
     pub gradients: [f64; 2],
 }
 
+impl Printed {
+    /// How many times as long conjugate gradients take as multigrid.
+    pub fn ratio(&self) -> f64 {
+        self.gradients[1] / self.multigrid_s
+    }
+}
+
 /// The bunny at 155 cells across.
 pub const BUNNY: Printed = Printed {
     name: "Bunny",

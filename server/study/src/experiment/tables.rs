@@ -279,7 +279,7 @@ fn measure(entry: &Entry, tables: &mut Tables) -> Result<(), Trouble> {
     let values = [before, uniform, after, cutting, None, None, step, both, uniform_step, per_cell];
     tables.costs.printed(&*name, &values);
     let [error, seconds] = printed.gradients.map(Some);
-    let ratio = Some(printed.gradients[1] / printed.multigrid_s);
+    let ratio = Some(printed.ratio());
     tables
         .solvers
         .printed(name, &[None, Some(printed.multigrid_s), Some(printed.reduction), error, seconds, ratio]);
