@@ -107,7 +107,7 @@ impl SystemOperator<'_> {
 
 impl Spring {
     /// Σ w x of the carriers.
-    pub fn moved(&self, x: &[Padded]) -> [f32; 3] {
+    fn moved(&self, x: &[Padded]) -> [f32; 3] {
         let mut p = [0.0; 3];
         for (copy, w) in self.point.carriers() {
             for (p, x) in p.iter_mut().zip(&x[copy]) {
