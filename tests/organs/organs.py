@@ -2,7 +2,7 @@
 
     python tests/organs/organs.py SCINDO OUT_DIR [--models DIR] [--only NAME]... [--steps N] [--cells N]
 
-Each body gets the scene of the README. Eight are made by shapes.py; with --models (or SCINDO_MODELS) four real ones
+Each body gets the same scene. Eight are made by shapes.py; with --models (or SCINDO_MODELS) four real ones
 join them: liver.msh, liver.vtk, liver-smooth.obj, stanford-bunny.obj. The table holds, per body: whether check and
 run agree that every step converges, the largest displacement foretold and seen (within 20 %), the processor
 time of a step foretold and measured (within a factor of 1.5). Exit code 1 when one of them is not met.
@@ -29,7 +29,7 @@ DISPLACEMENT, COST = 0.20, 1.5
 
 
 def scene(name, kind, path, scale, cells):
-    """The README's own lines; the fix is a slab, because every body has another size."""
+    """An organ held at its lowest tenth; the fix is a slab, because every body has another size."""
     mesh = f'{kind} = "{path}", scale = {scale}' + (f", cells = {cells}" if kind == "surface" else "")
     return f"""schema = 1
 name = "{name}"

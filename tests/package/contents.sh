@@ -24,7 +24,7 @@ for root in "$scratch/tree" "$scratch/deb/usr"; do
     share/bash-completion/completions/scindo-haptic share/zsh/site-functions/_scindo \
     share/fish/vendor_completions.d/scindo-view.fish share/scindo/scenes/KEYS.md \
     share/scindo/scenes/first-cut.toml share/scindo/proto/scindo/v1/server.proto share/doc/scindo/LICENSE-MIT \
-    share/doc/scindo/guide/first-scene.md \
+    share/doc/scindo/guide/{first-scene,troubleshooting,scene/cutting}.md share/doc/scindo/guide/pictures/cells.png \
     lib/systemd/system/scindo.service; do
     [ -s "$root/$file" ] || fail "$file is missing below $root"
   done

@@ -1,4 +1,4 @@
-"""Runs the Python of the two READMEs as it stands, with nothing but the package.
+"""Runs the Python of the guide and of the package's README as it stands, with nothing but the package.
 
 SCINDO_BIN=target/debug python tests/python/readme.py
 """
@@ -19,7 +19,7 @@ NAMED = {"scindo", "numpy"}
 
 def blocks(file, language):
     """Blocks of code of one language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", file.read_text(), re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}(?: .*)?\n(.*?)^```$", file.read_text(), re.MULTILINE | re.DOTALL)
 
 
 def run(code, folder, **more):
@@ -31,7 +31,7 @@ def run(code, folder, **more):
         elif isinstance(node, ast.ImportFrom):
             imports.add(node.module.split(".")[0])
     foreign = imports - NAMED - set(sys.stdlib_module_names)
-    assert not foreign, f"packages that the README does not name: {foreign}"
+    assert not foreign, f"packages that the page does not name: {foreign}"
     command = [sys.executable, "-c", code]
     done = subprocess.run(
         command, cwd=folder, env={**os.environ, **more}, stdout=subprocess.PIPE, text=True, timeout=300, check=True
@@ -50,15 +50,17 @@ def newtons(line):
     return float(re.search(r"finger on \w+: ([\d.e-]+) N", line)[1])
 
 
-def main_readme(folder):
-    """The scene of the README, served, touched and run."""
-    (scene,) = [text for text in blocks(ROOT / "README.md", "toml") if "# liver.toml" in text]
+def guide(folder):
+    """The scene of the guide, served, touched, cut and run."""
+    page = ROOT / "deploy/guide/python.md"
+    (scene,) = blocks(page, "toml")
     (folder / "liver.toml").write_text(scene)
-    (code,) = blocks(ROOT / "README.md", "python")
-    first, forces, last = run(code, folder)
+    (code,) = [code for code in blocks(page, "python") if "liver.toml" in code]
+    first, forces, cut, last = run(code, folder)
     points, triangles = shapes(first)
     assert triangles == 2 * points - 4 > 500, f"a closed surface: {first}"
     assert newtons(forces) > 0.01, forces
+    assert int(cut.removeprefix("cut elements: ")) > 0, cut
     status, count, _, stress = re.fullmatch(r"(\w+) \((\d+), (3)\) ([\d.]+)", last).groups()
     assert status == "done" and int(count) > 300 and float(stress) > 1.0, last
     return code
@@ -76,6 +78,6 @@ def package_readme(folder):
 
 
 if __name__ == "__main__":
-    for test in (main_readme, package_readme):
+    for test in (guide, package_readme):
         with tempfile.TemporaryDirectory() as folder:
             print(f"{test.__name__}: {len(test(pathlib.Path(folder)).splitlines())} lines of Python run")
