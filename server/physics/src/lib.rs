@@ -13,7 +13,7 @@
 //! No input or output, no clock, no thread that outlives its owner, no global state; the result of
 //! a step does not depend on the number of threads; no non-finite number leaves a body.
 //! SI units throughout. State is `f64`, kernels and solver vectors are `f32`.
-
+#![doc = include_str!("../SYMBOLS.md")]
 #![allow(non_snake_case)] // the symbols of the field: F, R, P, K, M
 #![allow(clippy::needless_range_loop)] // i, j, k are tensor indices and lanes
 

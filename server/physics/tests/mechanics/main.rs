@@ -22,6 +22,7 @@ mod multigrid;
 mod multistep;
 mod octree;
 mod octree_statics;
+mod paths;
 mod phases;
 mod pressure;
 mod quadratic_cuts;
