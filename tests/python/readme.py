@@ -19,7 +19,7 @@ NAMED = {"scindo", "numpy"}
 
 def blocks(file, language):
     """Blocks of code of one language."""
-    return re.findall(rf"^```{language}(?: .*)?\n(.*?)^```$", file.read_text(), re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}(?: [^\n]*)?\n(.*?)^```$", file.read_text(), re.MULTILINE | re.DOTALL)
 
 
 def run(code, folder, **more):
