@@ -34,7 +34,7 @@ pub struct BodySettings {
     /// Instructions of the kernels, as far as the machine has them. Those of [`Simd::Baseline`] give the same bits on
     /// every machine of the architecture.
     pub simd: Simd,
-    /// Finite element. Only [`ElementKind::Tet4`] can be cut.
+    /// Finite element. All but [`ElementKind::Hex8`] can be cut.
     pub element: ElementKind,
     /// Whether the hexahedra of [`ElementKind::Hex8`] are equal cubes, which the kernels of cells take. A body finds
     /// out itself.

@@ -692,7 +692,7 @@ impl LinearStep {
             Some(grid) => {
                 let mut V = grid.cycle(preconditioner.inverses());
                 match self.method {
-                    // The coarse levels know no springs: cycles alone would overshoot along them.
+                    // Coarse levels have stiff springs only: cycles alone would overshoot along soft ones.
                     Method::Multigrid if terms.is_empty() => pcg.cycles(team, &mut A, &mut V, delta, from),
                     _ => pcg.run(team, &mut A, &mut V, delta, from),
                 }

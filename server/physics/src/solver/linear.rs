@@ -25,8 +25,8 @@ pub enum Method {
     #[default]
     Pcg,
     /// Cycles of multigrid alone: x ← x + V (b − A x). Bodies without levels, and assembled matrices, are solved
-    /// by [`Pcg`](Self::Pcg) instead, and steps with springs under load by [`MgPcg`](Self::MgPcg), because only
-    /// the finest level has springs.
+    /// by [`Pcg`](Self::Pcg) instead, and steps with springs under load by [`MgPcg`](Self::MgPcg), because coarse
+    /// levels have stiff springs only.
     Multigrid,
     /// Conjugate gradients preconditioned by one cycle of multigrid; the same holds.
     MgPcg,
