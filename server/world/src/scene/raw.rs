@@ -186,9 +186,9 @@ pub struct RawBody {
     #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "1 often avoids inverted elements where a sudden \
         displacement would cause them"))]
     pub displacement_over_s: f64,
-    /// In place of `displacement_over_s`, what share of every `displacement_m` is reached when: points of time [s] and
-    /// share, linear between them. The share may be negative or above 1, and is constant before the first point and after
-    /// the last.
+    /// In place of `displacement_over_s`, the share of every `displacement_m` over time: points of time [s] and share,
+    /// with linear interpolation. The share may be negative or above 1, and is constant before the first point and
+    /// after the last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 10000))]
     pub displacement_table: Vec<[f64; 2]>,
@@ -364,8 +364,8 @@ pub struct RawLoad {
     pub force_n: Option<Vec3>,
     /// Pressure [Pa] on the boundary faces all of whose nodes are selected. It pushes into the body; a negative one
     /// pulls. It follows the deformed surface, except with the law `linear`, where it keeps the directions and areas
-    /// of the body at rest. Cut faces carry none. It acts on the
-    /// outer faces of octree cells, so its place is known to a cell. Not with cuts that change the mesh.
+    /// of the body at rest. Cut faces carry no pressure. On octree cells it acts on their outer faces, so its position
+    /// is accurate to one cell. Not with cuts that change the mesh.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9), extend("x-next" = "blood in arteries has about 13000 (100 mmHg)"))]
     pub pressure_pa: Option<f64>,
@@ -378,8 +378,8 @@ pub struct RawLoad {
     #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "some periods of the body's slowest vibration let it arrive \
         without swinging"))]
     pub ramp_s: f64,
-    /// In place of `ramp_s`, what share of force or pressure acts when: points of time [s] and share, linear between them. The
-    /// share may be negative or above 1, and is constant before the first point and after the last.
+    /// In place of `ramp_s`, the share of force or pressure over time: points of time [s] and share, with linear
+    /// interpolation. The share may be negative or above 1, and is constant before the first point and after the last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 10000))]
     pub table: Vec<[f64; 2]>,
@@ -534,14 +534,14 @@ pub enum RawFront {
 #[serde(deny_unknown_fields, default)]
 pub struct RawCutting {
     /// Cutting method: inside elements (`xfem`), along element faces (`snap`) or between cells (`links`). Baselines for
-    /// comparisons divide elements (`subdivide`) or take them out (`remove`).
+    /// comparisons divide elements (`subdivide`) or remove them (`remove`).
     /// Default: `links` for `octree`, otherwise `xfem`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<RawCutMethod>,
-    /// How far a cut goes on ahead of the blade. `behind`: not at all; no element is cut before the blade has left it,
-    /// and the body is too stiff by that. `calibrated`: by a share of the size of elements that makes up for those at the
-    /// front that do not open; for `tet4` with the method `xfem`, without `toughness_j_m2`. A blade that advances step by
-    /// step ends within a tenth of a cell of where one stroke ends, on average. Default: `behind`.
+    /// How far a cut runs ahead of the blade. `behind`: not at all; no element is cut before the blade has left it,
+    /// which makes the body too stiff. `calibrated`: by a share of the element size that compensates for elements at the
+    /// front that do not open; for `tet4` with the method `xfem`, without `toughness_j_m2`. Many small strokes end, on
+    /// average, within a tenth of a cell of where one long stroke ends. Default: `behind`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub front: Option<RawFront>,
     /// Whether a part that a cut separates from all held nodes moves freely or stays in place. `pinned` needs
@@ -720,12 +720,11 @@ pub struct RawEffects {
     /// `true` lets bodies touch themselves, e.g. the two lips of a cut.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub self_collision: Option<bool>,
-    /// `true` lets bodies sleep that have come to rest, until something touches them. Bodies that sleep are not
-    /// stepped.
+    /// `true` lets bodies at rest sleep until something touches them. Sleeping bodies are not stepped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sleep: Option<bool>,
     /// `true` lets a scene that runs in real time give up accuracy when its steps are late: first the estimate of the
-    /// error, then tolerances of linear solves up to 1e-2. What is still late runs in slow motion, and says so.
+    /// error, then tolerances of linear solves up to 1e-2. If steps are still late, it runs in slow motion and reports it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub governor: Option<bool>,
     /// `true` adds kinetic and elastic energy to every step report.

@@ -13,8 +13,8 @@ pub struct RawBodyContact {
     /// Stiffness, in multiples of Young's modulus over the size of an element.
     #[schemars(range(min = 0.1, max = 1000.0), extend("x-next" = "2 to 20; what is stiffer sinks in less"))]
     pub stiffness: f64,
-    /// How the triangles of every body are arranged to be found: by tools, bodies and clients. All methods give the
-    /// same results; `scindo accuracy collision` measures what each costs.
+    /// Broad phase: how the triangles that tools, bodies and clients touch are found. All methods give the same results;
+    /// `scindo accuracy collision` measures the cost of each.
     pub broad_phase: RawBroadPhase,
 }
 
