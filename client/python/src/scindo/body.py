@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, List, Optional, Tuple
+from typing import List, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._host import Host
 from ._mirror import Mirror, Surface
 from ._newest import Newest
 from .errors import TimedOut
 from .forces import Force
 from .v1 import server_pb2, surface_pb2
 
-if TYPE_CHECKING:
-    from .session import Session
-
 
 class Body:
     """One body. From the first use on, its surface is kept up to date in the background."""
 
-    def __init__(self, session: Session, id: str) -> None:
+    def __init__(self, session: Host, id: str) -> None:
         #: Name in the scene.
         self.id = id
         self._session = session

@@ -5,19 +5,17 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Dict, Sequence, Union
+from typing import Any, Dict, Sequence, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._host import Host
 from ._link import sentence
 from ._newest import Newest
 from .errors import InvalidValue, Refused, TimedOut
 from .v1 import cut_pb2
 from .values import MAX_COORDINATE_M, Array, Vector, put_vec3, vector
-
-if TYPE_CHECKING:
-    from .session import Session
 
 #: Positions [tip, heel] of the blade, n × 2 × 3 [m].
 Sweep = Union[NDArray[Any], Sequence[Any]]
@@ -110,7 +108,7 @@ class PendingCut:
 class Cutter:
     """Numbers and sends the cuts of one tool, and sorts their answers."""
 
-    def __init__(self, session: Session, tool: str) -> None:
+    def __init__(self, session: Host, tool: str) -> None:
         self._session, self._tool = session, tool
         self._lock = threading.Lock()
         self._waiting: Dict[int, PendingCut] = {}

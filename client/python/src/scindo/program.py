@@ -1,12 +1,10 @@
-"""The program ``scindo`` on this machine: where it is, and a server of one's own."""
+"""A server of one's own: the program ``scindo`` as a child of this program."""
 
 from __future__ import annotations
 
 import json
-import os
 import pathlib
 import random
-import shutil
 import socket
 import subprocess
 import tempfile
@@ -14,34 +12,10 @@ import threading
 from collections import deque
 from typing import Any, Deque, List, Optional, Sequence, Union
 
-from .errors import ProgramNotFound, RunFailed
+from ._executable import find_program, last_lines
+from .errors import RunFailed
 from .scene import Path, Scene
 from .session import Session, connect
-
-
-def find_program() -> pathlib.Path:
-    """The program ``scindo``: the one that ``SCINDO_BIN`` names, or the first on ``PATH``.
-
-    Raises:
-        ProgramNotFound: it is in neither place.
-    """
-    named = os.environ.get("SCINDO_BIN")
-    if named:
-        path = pathlib.Path(named)
-        path = path / "scindo" if path.is_dir() else path
-        if not os.access(path, os.X_OK):
-            raise ProgramNotFound(
-                f"SCINDO_BIN = {named} is no program and no folder with the program scindo",
-                hint="Name the file `scindo` itself",
-            )
-        return path
-    found = shutil.which("scindo")
-    if found is None:
-        raise ProgramNotFound(
-            "the program scindo is not on PATH",
-            hint="Build it with `cargo build --release`, and set SCINDO_BIN to target/release/scindo",
-        )
-    return pathlib.Path(found)
 
 
 def scene_file(scene: Union[Scene, Path], folder: pathlib.Path) -> pathlib.Path:
@@ -164,11 +138,6 @@ def serve(
     except BaseException:
         folder.cleanup()
         raise
-
-
-def last_lines(text: str, count: int = 6) -> str:
-    """The last lines of what a program said, as one line."""
-    return " ".join(line.strip() for line in text.strip().splitlines()[-count:])
 
 
 def _drain(stream: Any, lines: Deque[str]) -> threading.Thread:

@@ -8,8 +8,9 @@ import subprocess
 import tempfile
 from typing import Any, List, Optional, Union
 
-from .errors import InvalidValue, RunFailed, SceneError
-from .program import find_program, last_lines, overrides, scene_file
+from ._executable import find_program, last_lines
+from .errors import InvalidValue, RunFailed
+from .program import overrides, scene_file
 from .results import Results
 from .scene import Path, Scene
 
@@ -69,15 +70,6 @@ def run(
                 hint="`scindo check` looks at the scene; check=False returns what a failed run has written",
             )
         return Results.read(folder)
-
-
-def check_by_program(scene: Scene) -> None:
-    """Lets ``scindo check`` judge a scene, without steps."""
-    with tempfile.TemporaryDirectory(prefix="scindo-") as scratch:
-        command = [str(find_program()), "check", str(scene.save(pathlib.Path(scratch) / "scene.json")), "--no-solve"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise SceneError("scene", last_lines(done.stderr or done.stdout))
 
 
 def forecast(scene: Union[Scene, Path]) -> Any:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import copy
 import json
 import pathlib
+import tempfile
 from typing import Any, Dict, List, Optional, Union
 
 import numpy as np
 
 from . import _schema
+from ._executable import check_file
 from .errors import SceneError, unknown
 from .values import Vector
 
@@ -141,9 +143,8 @@ class Scene:
         """
         _schema.check(self._data)
         if whole:
-            from .run import check_by_program
-
-            check_by_program(self)
+            with tempfile.TemporaryDirectory(prefix="scindo-") as scratch:
+                check_file(self.save(pathlib.Path(scratch) / "scene.json"))
 
     def to_dict(self) -> Dict[str, Any]:
         """A copy of the keys of the scene file."""

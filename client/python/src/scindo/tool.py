@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Dict, Optional
+from typing import Any, Dict, Optional
 
 import numpy as np
 import zenoh
 
+from ._host import Host
 from ._newest import Newest
 from .errors import InvalidValue, Refused, TimedOut
 from .v1 import tool_pb2
 from .values import Array, Vector, from_vec3, put_vec3, quaternion, vector
-
-if TYPE_CHECKING:
-    from .session import Session
 
 MODES: Dict[str, Any] = {
     "hover": tool_pb2.ToolSample.MODE_HOVER,
@@ -56,7 +54,7 @@ class Tool:
     session, even if the program dies.
     """
 
-    def __init__(self, session: Session, id: str, shape: Optional[tool_pb2.ToolShape]) -> None:
+    def __init__(self, session: Host, id: str, shape: Optional[tool_pb2.ToolShape]) -> None:
         #: Name of the tool.
         self.id = id
         self._session, self._shape = session, shape
