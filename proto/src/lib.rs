@@ -12,17 +12,17 @@
 
 pub mod messages;
 
-pub mod key;
+pub mod limits;
 
 pub mod endpoint;
 
-pub mod limits;
-
-mod check;
-
 pub mod name;
 
+pub mod key;
+
 pub mod codec;
+
+mod check;
 
 pub use codec::{DecodeError, WireMessage, decode, decode_as, encode, encoding};
 pub use key::{Chunk, KeyError, KeySpace, MOUSE, Role, Topic, Verb};

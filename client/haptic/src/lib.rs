@@ -29,24 +29,24 @@ pub mod clock;
 
 pub mod device;
 
+pub mod statistics;
+
 pub mod contact;
+
+pub mod safety;
 
 pub mod virtual_coupling;
 
 pub mod blend;
 
-pub mod safety;
-
 pub mod log;
 
 pub mod live;
 
-pub mod statistics;
+pub mod link;
 
 pub mod tick;
 
 pub mod haptic_loop;
-
-pub mod link;
 
 pub mod command;

@@ -25,9 +25,9 @@
 //! Nothing here blocks zenoh's receiving thread. New state overwrites older state. Queues of messages that
 //! must not be lost are bounded and count what they drop.
 
-pub mod config;
-
 pub mod error;
+
+pub mod config;
 
 pub mod link;
 

@@ -19,15 +19,15 @@ mod origin;
 
 mod listen;
 
-pub mod socket;
-
 mod door;
+
+pub mod socket;
 
 pub mod server;
 
-mod upstream;
-
 pub mod coarse;
+
+mod upstream;
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::net::SocketAddr;

@@ -22,7 +22,7 @@ use scindo_physics::cut::{BladeSweep, CutMesh};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 use scindo_physics::operator::OperatorChoice;
-use scindo_physics::space::skin::{Skin, SkinSettings};
+use scindo_physics::skin::{Skin, SkinSettings};
 
 const SIZE_M: f64 = 0.1;
 const DOWN: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);

@@ -8,14 +8,16 @@ use std::time::Instant;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::element::FixedCopy;
 use scindo_physics::element::Simd;
 use scindo_physics::material::{Lame, Law};
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace, Shape};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, Shape};
 use scindo_physics::operator::cells::CellStiffness;
-use scindo_physics::operator::{BLOCK, BlockJacobi, ElasticUpdate, FixedCopy, Stiffness};
+use scindo_physics::operator::{BLOCK, BlockJacobi, ElasticUpdate, Stiffness};
 use scindo_physics::solver::multigrid::{
     CellMaterial, Coefficients, Hierarchy, Multigrid, MultigridSettings,
 };
+use scindo_physics::space::OctreeSpace;
 use scindo_physics::space::Space;
 use scindo_physics::team::{Team, blocks};
 

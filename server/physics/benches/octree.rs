@@ -17,11 +17,10 @@ use scindo_physics::body::{Body, BodySettings, Method, PcgSettings};
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::Simd;
 use scindo_physics::material::{Law, Material, Rayleigh};
-use scindo_physics::octree::{
-    BoxShape, CutLink, LinkKey, Octree, OctreeSettings, OctreeSpace, OctreeSurface,
-};
+use scindo_physics::octree::{BoxShape, CutLink, LinkKey, Octree, OctreeSettings, OctreeSurface};
 use scindo_physics::operator::cells::CellStiffness;
 use scindo_physics::solver::multigrid::Hierarchy;
+use scindo_physics::space::OctreeSpace;
 use scindo_physics::space::Space;
 use scindo_physics::team::Team;
 

@@ -1,9 +1,10 @@
 //! Continuum mechanics of one deformable, cuttable body.
 //!
-//! Modules stand in the order of the data. A [`mesh`] is the material at rest, a [`material`] its law and
-//! constants, an [`element`] its resistance to deformation. [`cut`] divides elements into pieces and
-//! nodes into copies, or makes a new mesh ([`cut::remesh`]). An [`octree`] holds hexahedral cells and the
-//! links between them, which cuts open. A [`team`] of threads shares the work of a step.
+//! Modules stand in the order of the data, and each knows only those before it. A [`team`] of threads shares the work
+//! of a step. A [`material`] is a law with its constants, an [`element`] its resistance to deformation, a [`mesh`] the
+//! material at rest. [`cut`] divides elements into pieces and nodes into copies, or makes a new mesh ([`cut::remesh`]). A
+//! [`skin`] is a surface finer than the elements, and an [`octree`] holds hexahedral cells and the links between them,
+//! which cuts open.
 //! An [`assembly`] gives the forces and matrices of any element with any law, and those of pressure; an
 //! [`operator`] is the fast way from displacements to forces. A [`solver`] inverts it, with multigrid among
 //! its preconditioners. A [`space`] is what a discretisation offers a body, its surface included. An
@@ -18,13 +19,13 @@
 #![allow(clippy::needless_range_loop)] // i, j, k are tensor indices and lanes
 
 mod storage;
-mod sync;
-pub mod mesh;
+pub mod team;
 pub mod material;
 pub mod element;
+pub mod mesh;
 pub mod cut;
+pub mod skin;
 pub mod octree;
-pub mod team;
 pub mod assembly;
 pub mod operator;
 pub mod solver;

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use scindo_physics::operator::Held;
+use scindo_physics::element::Held;
 use scindo_world::scene::{CutPath, Fault, Scene};
 
 /// A scene without faults, to be spoilt.

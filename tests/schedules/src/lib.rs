@@ -7,6 +7,9 @@
 
 #![allow(dead_code, unreachable_pub)] // the sources of the team also serve what is not tried here
 
-pub mod sync;
+/// The paths under which the team finds them.
+pub mod storage {
+    pub mod sync;
+}
 #[path = "../../../server/physics/src/team/mod.rs"]
 pub mod team;

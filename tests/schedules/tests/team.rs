@@ -7,7 +7,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use scindo_schedules::sync::{Arc, AtomicBool, AtomicUsize, Ordering};
+use scindo_schedules::storage::sync::{Arc, AtomicBool, AtomicUsize, Ordering};
 use scindo_schedules::team::{Team, blocks};
 
 /// Tries a scene by two ways of scheduling: threads in random order, and random priorities that change a few

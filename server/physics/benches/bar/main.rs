@@ -18,11 +18,12 @@ use std::time::Instant;
 use machine::{LEVEL_NAMES, Machine};
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, Method, PcgSettings, Scheme};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::element::Simd;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 use scindo_physics::operator::{
-    BlockJacobi, Elastic, ElasticUpdate, FixedCopy, LinearOperator, OperatorChoice, Stiffness, SystemOperator,
+    BlockJacobi, Elastic, ElasticUpdate, LinearOperator, OperatorChoice, Stiffness, SystemOperator,
 };
 use scindo_physics::solver::Pcg;
 use scindo_physics::team::Team;

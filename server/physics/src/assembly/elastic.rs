@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use super::kernel::{add_forces, add_green_blocks, add_upper_blocks, mirror};
 use super::point::projected;
 use super::scratch::Buffers;
-use super::{BlockCsr, ElementKind, Model, Volumetric};
-use crate::element::deformation_gradient;
+use super::{BlockCsr, Model, Volumetric};
+use crate::element::{ElementKind, deformation_gradient};
 use crate::material::{Law, Split, Tangent};
 
 /// Where and how a tangent is taken.

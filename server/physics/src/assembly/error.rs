@@ -2,7 +2,8 @@
 
 use thiserror::Error;
 
-use super::{ElementKind, Volumetric};
+use super::Volumetric;
+use crate::element::ElementKind;
 use crate::material::{Law, MaterialError, RegionsError};
 use crate::mesh::MeshError;
 

@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 
 use super::mass::{MassSharing, Products};
-use super::{BlockCsr, ElementKind, Model};
+use super::{BlockCsr, Model};
+use crate::element::ElementKind;
 use crate::element::tet10::HRZ;
 
 /// Part of its even share that a node has at least. ω² grows by 1/FLOOR at most, so the critical step is at least

@@ -17,7 +17,7 @@ mod block_csr;
 pub mod pressure;
 mod point;
 mod error;
-mod kinds;
+mod volumetric;
 mod model;
 mod build;
 mod quadratic;
@@ -36,10 +36,11 @@ mod viscoelastic;
 pub use crate::material::Tangent;
 pub use block_csr::BlockCsr;
 pub use error::ModelError;
-pub use kinds::{ElementKind, Volumetric};
+
 pub use mass::MassSharing;
 pub use model::Model;
 pub use quadratic::QuadraticPiece;
+pub use volumetric::Volumetric;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

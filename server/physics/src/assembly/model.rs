@@ -7,8 +7,8 @@ use super::mass::{MassSharing, Products};
 use super::point::PointLaw;
 use super::scratch::Scratch;
 use super::viscous::Viscous;
-use super::{BlockCsr, ElementKind, ModelError, Volumetric};
-use crate::element::{Point, Points, Spring, deformation_gradient};
+use super::{BlockCsr, ModelError, Volumetric};
+use crate::element::{ElementKind, Point, Points, Spring, deformation_gradient};
 use crate::material::{Fibres, Lame, Law, Region, Regions};
 
 /// A discretised elastic body in double precision.

@@ -6,7 +6,8 @@ use nalgebra::Vector3;
 
 use super::elastic::Linearisation;
 use super::scratch::{Buffers, Work};
-use super::{BlockCsr, ElementKind, Model};
+use super::{BlockCsr, Model};
+use crate::element::ElementKind;
 use crate::material::{Law, Tangent};
 use crate::team::{Team, blocks, ranges};
 

@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 
 use super::mass::{Products, pack};
-use super::{ElementKind, Model, ModelError, Volumetric};
+use super::{Model, ModelError, Volumetric};
+use crate::element::ElementKind;
 use crate::element::quadrature::QuadraturePoint;
 use crate::element::tet10::{self, HRZ};
 use crate::material::{Material, Regions};

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::*;
 use crate::cut::{BladeSweep, CutMesh};
-use crate::element::Spring;
+use crate::element::{ElementKind, Spring};
 use crate::material::{Law, Material, Rayleigh, Region, Regions};
 use crate::mesh::{BoxPattern, box_hexes, box_mesh};
 use crate::team::Team;

@@ -6,9 +6,8 @@ use super::{Body, BodyError};
 use crate::cut::NewCopy;
 use crate::element::Points;
 use crate::integrator::Adapted;
-use crate::octree::{
-    Activity, AdaptSettings, Family, Leaf, OUTSIDE, OctreeRefinement, OctreeSpace, Restriction,
-};
+use crate::octree::{Activity, AdaptSettings, Family, Leaf, OUTSIDE, Restriction};
+use crate::space::{OctreeRefinement, OctreeSpace};
 use crate::storage::reserve::resize_reserving;
 
 /// What an adaptation changed.

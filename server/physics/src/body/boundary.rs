@@ -8,8 +8,8 @@ use crate::cut::NewCopy;
 use crate::cut::remesh::SnapNode;
 use crate::cut::remesh::node::NEW;
 use crate::element::MaterialPoint;
+use crate::element::{FixedCopy, Held};
 use crate::octree::{Coarsening, OUTSIDE};
-use crate::operator::{FixedCopy, Held};
 use crate::space::Space;
 use crate::storage::reserve::resize_reserving;
 

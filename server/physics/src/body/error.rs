@@ -7,7 +7,7 @@ use crate::cut::CutError;
 use crate::integrator::DynamicsError;
 use crate::material::{MaterialError, RegionsError};
 use crate::mesh::MeshError;
-use crate::space::skin::SkinError;
+use crate::skin::SkinError;
 
 /// A refused request; the body is as it was.
 #[derive(Debug, Error)]

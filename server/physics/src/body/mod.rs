@@ -39,11 +39,13 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::Vector3;
 
 use crate::assembly::Model;
+pub use crate::assembly::Volumetric;
 use crate::assembly::pressure::Pressure;
-pub use crate::assembly::{ElementKind, Volumetric};
 pub use crate::cut::FrontRule;
 use crate::cut::remesh::Snapper;
 use crate::cut::{CutMesh, IncisionMark, Surface};
+pub use crate::element::ElementKind;
+use crate::element::FixedCopy;
 use crate::integrator::{
     Dynamics, LinearlyImplicit, LocalConnectivity, LooseParts, ModelSolver, State, StepInputs, StepSolver,
 };
@@ -52,11 +54,10 @@ pub use crate::integrator::{
 };
 use crate::material::{Material, Rayleigh, Regions};
 use crate::mesh::{HexMesh, TetMesh};
-use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
+use crate::skin::{Kept, OwnSurface, Skin, SkinSettings, SkinShape};
 pub use crate::solver::multigrid::CycleShape;
 pub use crate::solver::{Method, PcgSettings, StopReason};
-use crate::space::skin::{Kept, OwnSurface, Skin, SkinSettings, SkinShape};
 use crate::space::{Space, Tets};
 use crate::storage::reserve::{refill, resize_reserving};
 use crate::team::Team;

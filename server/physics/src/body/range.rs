@@ -7,8 +7,8 @@
 use nalgebra::Vector3;
 
 use crate::cut::NewCopy;
+use crate::element::FixedCopy;
 use crate::integrator::LooseParts;
-use crate::operator::FixedCopy;
 
 /// Largest extent of a part, as a multiple of that at rest or of that of its prescribed positions.
 const MOST_STRETCH: f64 = 10.0;
@@ -148,7 +148,7 @@ impl Range {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::operator::Held;
+    use crate::element::Held;
 
     /// Two edges of 1 m, held at their first ends.
     fn two_edges() -> (Vec<Vector3<f64>>, LooseParts, Range) {

@@ -1,9 +1,10 @@
 //! How a body is discretised and solved, and which combinations the fast path supports.
 
 use super::{Ablation, BodyError, CuttingMethod, LooseRule, cost};
-use crate::assembly::{ElementKind, Volumetric};
+use crate::assembly::Volumetric;
 use crate::cut::FrontRule;
 use crate::cut::remesh::SnapSettings;
+use crate::element::ElementKind;
 use crate::element::Simd;
 use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
 use crate::material::{Fibres, Law, Prony};

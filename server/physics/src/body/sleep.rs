@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::Body;
-use crate::operator::{FixedCopy, Held};
+use crate::element::{FixedCopy, Held};
 
 impl Body {
     /// Puts a part that is held nowhere to sleep. Every copy of it is held where it is, at rest, until

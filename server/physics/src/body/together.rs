@@ -5,8 +5,8 @@ use smallvec::SmallVec;
 
 use super::{Body, Notice, Outcome, PointSpring, Scheme, SolveReport};
 use crate::assembly::pressure::Pressure;
+use crate::element::FixedCopy;
 use crate::integrator::{LooseParts, PairSpring, StepInputs, Together};
-use crate::operator::FixedCopy;
 use crate::solver::{PcgSettings, StopReason};
 use crate::space::Space;
 

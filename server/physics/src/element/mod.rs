@@ -16,8 +16,12 @@ pub mod hex8;
 mod prefetch;
 mod spring;
 mod points;
+mod kinds;
+mod held;
 mod material_point;
 
+pub use held::{FixedCopy, Held};
+pub use kinds::ElementKind;
 pub(crate) use lanes::for_eight;
 pub use lanes::{Batched, Halves, Ids, LANES, Lanes, Simd, Vector, Vector8};
 pub use material_point::{MOST_CARRIERS, MaterialPoint};

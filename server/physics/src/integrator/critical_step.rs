@@ -13,8 +13,8 @@ use super::springs::ActiveSpring;
 use super::state::hold;
 use crate::assembly::{BlockCsr, Model, Tangent};
 
+use crate::element::FixedCopy;
 use crate::material::Rayleigh;
-use crate::operator::FixedCopy;
 use crate::team::Team;
 
 /// Largest number of products with K; far more than a mesh of good quality needs.

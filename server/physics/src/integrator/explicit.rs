@@ -11,8 +11,8 @@ use super::scheme::Scheme;
 use super::state::{State, hold};
 use super::step_inputs::StepInputs;
 use crate::assembly::Tangent;
+use crate::element::FixedCopy;
 use crate::material::Law;
-use crate::operator::FixedCopy;
 use crate::team::Team;
 use crate::team::phase::Phase;
 

@@ -8,7 +8,7 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::parts::LooseParts;
-use crate::operator::FixedCopy;
+use crate::element::FixedCopy;
 
 /// Eigenvalues below this fraction of the trace count as zero: rounding, or a held angle of 1e-6.
 const NULL: f64 = 1e-12;

@@ -27,12 +27,12 @@ use super::springs::ActiveSpring;
 use super::state::{State, WEIGHTLESS, hold};
 use super::step_grid::StepGrid;
 use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
+use crate::element::{FixedCopy, Held};
 use crate::material::Rayleigh;
 use crate::octree::Octree;
 use crate::operator::{
-    BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, Held, LinearOperator, Padded, Spring,
-    StiffModes, Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, invert_free,
-    padded, unpadded,
+    BLOCK, Block6, BlockJacobi, CompositeDiagonal, LinearOperator, Padded, Spring, StiffModes, Stiffness,
+    Substitution, Sum, SystemOperator, apply, block_of, filter, invert, invert_free, padded, unpadded,
 };
 use crate::solver::multigrid::{CoarsestSolve, CycleShape, Hierarchy, LevelReport, Multigrid};
 use crate::solver::two_level::CoarseSpace;

@@ -6,7 +6,7 @@
 
 use super::parts::LooseParts;
 use crate::cut::NewCopy;
-use crate::operator::FixedCopy;
+use crate::element::FixedCopy;
 use crate::space::Space;
 use crate::storage::disjoint::{find, join};
 use crate::storage::numbering::Numbering;
@@ -97,8 +97,8 @@ mod tests {
 
     use super::*;
     use crate::cut::{BladeSweep, CutMesh};
+    use crate::element::Held;
     use crate::mesh::{BoxPattern, box_mesh};
-    use crate::operator::Held;
     use crate::space::Tets;
     use crate::team::Team;
 

@@ -99,7 +99,7 @@ impl Mass {
     }
 
     /// Sets the prescribed directions; M⁻¹ then acts on the others.
-    pub fn hold(&mut self, fixed: &[crate::operator::FixedCopy]) {
+    pub fn hold(&mut self, fixed: &[crate::element::FixedCopy]) {
         if let Some((M, _)) = &self.consistent {
             self.solver.set_matrix(M, fixed);
         }

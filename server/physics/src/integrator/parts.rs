@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::operator::FixedCopy;
+use crate::element::FixedCopy;
 use crate::storage::disjoint::{find, join};
 use crate::storage::reserve::resize_reserving;
 

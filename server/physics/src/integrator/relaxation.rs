@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 use super::statics::prescribe;
 use crate::assembly::BlockCsr;
-use crate::operator::FixedCopy;
+use crate::element::FixedCopy;
 use crate::solver::{Curvature, DiagonalInverse, Filter, Potential, StopReason};
 use crate::team::Team;
 

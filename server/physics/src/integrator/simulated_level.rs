@@ -13,10 +13,11 @@ use nalgebra::Vector3;
 
 use super::step_grid::set_coefficients;
 use super::step_inputs::{LinearInputs, StepInputs};
+use crate::element::FixedCopy;
 use crate::octree::Octree;
 use crate::operator::{
-    BLOCK, FixedCopy, LinearOperator, Padded, Preconditioner, Spring, Stiffness, block_of, filter, padded,
-    rows, unpadded,
+    BLOCK, LinearOperator, Padded, Preconditioner, Spring, Stiffness, block_of, filter, padded, rows,
+    unpadded,
 };
 use crate::solver::multigrid::{Coefficients, Composite, CycleShape, Hierarchy, Multigrid};
 use crate::solver::{LinearReport, Method, Pcg, PcgSettings, StopReason};

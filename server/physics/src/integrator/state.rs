@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::element::FixedCopy;
 use crate::material::Strain;
-use crate::operator::FixedCopy;
 
 /// What a body keeps from step to step: positions and velocities, one entry per copy, and what relaxes in a viscoelastic
 /// body.

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use crate::assembly::pressure::{Follower, Pressure};
 use crate::assembly::{BlockCsr, Model, Tangent};
-use crate::operator::FixedCopy;
+use crate::element::FixedCopy;
 use crate::solver::{Curvature, Newton, NewtonReport, Potential};
 use crate::team::Team;
 

@@ -8,8 +8,9 @@ use super::springs::{ActiveSpring, PointSpring};
 use super::state::State;
 use crate::assembly::pressure::Pressure;
 use crate::element::Points;
+use crate::element::{FixedCopy, Held};
 use crate::material::Material;
-use crate::operator::{ElasticUpdate, FixedCopy, Held};
+use crate::operator::ElasticUpdate;
 use crate::solver::{LinearReport, PcgSettings};
 
 /// Inputs of one step.

@@ -74,7 +74,7 @@ impl Octree {
     }
 
     /// The same among the links of some leaves, which hold all that may meet the triangles.
-    pub(super) fn crossed_links_in(
+    pub(crate) fn crossed_links_in(
         &self,
         team: &mut Team,
         leaves: &[u32],
@@ -114,7 +114,7 @@ impl Octree {
     }
 
     /// Those of these leaves that may meet the box between two corners [m], as [`leaves_near`](Self::leaves_near).
-    pub(super) fn leaves_near_of(
+    pub(crate) fn leaves_near_of(
         &self,
         leaves: &[u32],
         x: &[Vector3<f64>],
@@ -261,7 +261,7 @@ fn beyond(p: &Vector3<f64>, low: &Vector3<f64>, high: &Vector3<f64>) -> u8 {
 }
 
 /// Corners of the smallest box around the triangles of a sweep [m].
-pub(super) fn swept_box(triangles: &[SweepTriangle]) -> [Vector3<f64>; 2] {
+pub(crate) fn swept_box(triangles: &[SweepTriangle]) -> [Vector3<f64>; 2] {
     bounds(triangles.iter().flat_map(|t| [t.low, t.high]))
 }
 

@@ -34,6 +34,12 @@ impl Leaf {
 }
 
 impl Octree {
+    /// Whether the face of leaf `id` in direction `d` is on the boundary of the body.
+    pub(crate) fn leads_out(&self, id: u32, d: usize) -> bool {
+        let cell = &self.cells[id as usize];
+        cell.cut >> d & 1 == 1 && self.leaf(Self::across(cell.at, d)) == OUTSIDE
+    }
+
     /// Rest position of every vertex [m].
     pub fn rest_positions(&self) -> Vec<Vector3<f64>> {
         self.points.iter().map(|&p| self.lattice.point(p)).collect()
@@ -63,7 +69,7 @@ impl Octree {
     /// Brings the volumes of vertices up to date after `change`, in time that only depends on its size. They are
     /// those of [`vertex_volumes`](Self::vertex_volumes) to the bit: shares of finest cells are sums of 32nds,
     /// which are exact.
-    pub(super) fn follow_volumes(&self, change: &OctreeChange, volumes: &mut Vec<f64>) {
+    pub(crate) fn follow_volumes(&self, change: &OctreeChange, volumes: &mut Vec<f64>) {
         let finest = self.lattice.h.powi(3);
         resize_reserving(volumes, self.n_vertices(), 0.0);
         let mut add = |v: u32, share: f64| {

@@ -4,7 +4,6 @@
 //! Dick, Georgii, Westermann 2011: A hexahedral multigrid approach for simulating cuts in deformable objects.
 
 mod adapt;
-mod adapt_space;
 mod blade;
 mod build;
 mod cells;
@@ -14,28 +13,26 @@ mod cubes;
 mod lattice;
 mod link_map;
 mod measures;
-mod near;
+pub(crate) mod near;
 mod restriction;
 mod shape;
-mod skin_faces;
 mod solid;
-mod space;
 mod surface;
 mod vertices;
 
 pub use adapt::{Activity, AdaptError, AdaptSettings, Plan};
-pub use adapt_space::OctreeRefinement;
+pub(crate) use blade::swept_box;
 pub use build::Bits;
 pub use cells::{Cell, Octree, OctreeError};
 pub use change::{Leaf, OctreeChange};
 pub use coarsen::{Coarsening, Family};
 pub use lattice::{At, DIRECTIONS, Lattice, LeafMap, OUTSIDE, OctreeSettings, morton_code};
 pub use link_map::{CutLink, LinkHasher, LinkKey, LinkMap};
+pub(crate) use measures::FACES;
 pub use measures::Leaves;
 pub use restriction::Restriction;
 pub use shape::{BoxShape, Shape};
-pub use space::OctreeSpace;
-pub use surface::OctreeSurface;
+pub use surface::{OctreeSurface, OwnSkin};
 pub use vertices::{Octants, corner_shares, corner_weights, parent_corner};
 
 #[cfg(test)]

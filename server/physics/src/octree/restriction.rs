@@ -13,7 +13,7 @@
 use nalgebra::Vector3;
 
 use super::coarsen::Coarsening;
-use crate::operator::FixedCopy;
+use crate::element::FixedCopy;
 use crate::storage::disjoint::{find, join};
 
 /// The solver stops at this part of its first right-hand side.

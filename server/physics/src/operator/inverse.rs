@@ -2,7 +2,8 @@
 
 use nalgebra::Matrix3;
 
-use super::{Block6, Held, Padded};
+use super::{Block6, Padded};
+use crate::element::Held;
 
 /// The inverse of one symmetric 3×3 block in 32 bytes, which a step streams through once per iteration:
 /// rows (xx, xy, yy, 0) and (xz, yz, zz, 0), so that a shuffle of the two is a column.

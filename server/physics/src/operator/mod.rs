@@ -9,7 +9,6 @@ mod elastic;
 mod kernel;
 mod edges;
 mod groups;
-mod held;
 mod precondition;
 mod inverse;
 mod preconditioner;
@@ -25,7 +24,6 @@ mod tet_lanes;
 
 pub use composite_diagonal::CompositeDiagonal;
 pub use elastic::Elastic;
-pub use held::Held;
 pub use inverse::{Inverse3, invert, invert_free};
 pub use precondition::{Iterate, Preconditioner};
 pub use preconditioner::BlockJacobi;
@@ -33,15 +31,13 @@ pub use rows::Sum;
 pub use stiff_modes::{NearPiece, StiffModes, degenerate_elements};
 pub use stiffness::{Direction, ElasticUpdate, OperatorChoice, Place, Stiffness, apply};
 pub use substitution::{Substitutable, Substitution};
-pub use system::{FixedCopy, Spring, SystemOperator, filter, filter_block};
+pub use system::{Spring, SystemOperator, filter, filter_block};
 pub use tet_batch::Block6;
 
+pub use crate::storage::padded::{Padded, padded, unpadded};
 use crate::storage::saved::saved_as;
 use crate::team::{Team, blocks};
 use cells::CellStiffness;
-
-/// A vector of three components with an unused fourth (always 0), so that one copy is one register.
-pub type Padded = [f32; 4];
 
 saved_as!(saved_stiffness, Box, Stiffness, Tets(Elastic), Cells(CellStiffness));
 
@@ -96,17 +92,6 @@ pub struct Advance<'a> {
 #[inline(always)]
 pub fn block_of<T>(v: &[T], block: usize) -> &[T] {
     &v[block * BLOCK..((block + 1) * BLOCK).min(v.len())]
-}
-
-/// x, y, z of a double-precision vector, rounded.
-pub fn padded(v: &nalgebra::Vector3<f64>) -> Padded {
-    [v.x as f32, v.y as f32, v.z as f32, 0.0]
-}
-
-/// x, y, z of a padded vector in double precision.
-#[inline(always)]
-pub fn unpadded(v: &Padded) -> nalgebra::Vector3<f64> {
-    nalgebra::Vector3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
 }
 
 #[cfg(test)]

@@ -2,9 +2,10 @@
 //! they are not stiff.
 
 use super::{
-    BLOCK, Block6, FixedCopy, Held, Inverse3, Iterate, LinearOperator, Padded, Preconditioner, Substitution,
-    Sum, block_of, invert, invert_free, rows,
+    BLOCK, Block6, Inverse3, Iterate, LinearOperator, Padded, Preconditioner, Substitution, Sum, block_of,
+    invert, invert_free, rows,
 };
+use crate::element::{FixedCopy, Held};
 use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 

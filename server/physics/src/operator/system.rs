@@ -2,20 +2,9 @@
 //! filtered out.
 
 use super::stiffness::{Direction, Stiffness};
-use super::{Advance, BLOCK, Block6, Held, LinearOperator, Padded, Substitution, block_of};
-use crate::element::MaterialPoint;
+use super::{Advance, BLOCK, Block6, LinearOperator, Padded, Substitution, block_of};
+use crate::element::{FixedCopy, MaterialPoint};
 use crate::team::{Team, blocks};
-
-/// A copy whose displacement is prescribed in some directions.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct FixedCopy {
-    /// Index of the copy.
-    pub copy: u32,
-    /// The prescribed directions.
-    pub held: Held,
-    /// Prescribed position [m]; only its part in the directions of `held` is used.
-    pub position_m: [f64; 3],
-}
 
 /// Stiffness along `direction` between a material point and the world, or in all directions.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::constraint::Filter;
 use super::real::{Real, dot};
 use crate::assembly::BlockCsr;
-use crate::operator::Held;
+use crate::element::Held;
 
 /// M⁻¹: the inverses of the 3×3 diagonal blocks of A, 0 in the prescribed directions.
 ///

@@ -2,7 +2,7 @@
 
 use nalgebra::{RealField, Vector3};
 
-use crate::operator::{FixedCopy, Held};
+use crate::element::{FixedCopy, Held};
 
 /// The projection S onto the directions that are free: a block per copy, of ones and zeros
 /// where it is held along world axes.

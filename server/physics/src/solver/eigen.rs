@@ -13,7 +13,7 @@ use thiserror::Error;
 use super::cholesky::{Cholesky, Failure};
 use super::constraint::Filter;
 use crate::assembly::BlockCsr;
-use crate::operator::FixedCopy;
+use crate::element::FixedCopy;
 use crate::team::Team;
 
 /// Which natural frequencies are computed and how exactly.

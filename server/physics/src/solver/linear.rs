@@ -13,7 +13,8 @@ use super::real::Real;
 use super::report::{LinearReport, StopReason};
 use super::substituted::Substituted;
 use crate::assembly::BlockCsr;
-use crate::operator::{BLOCK, FixedCopy, StiffModes};
+use crate::element::FixedCopy;
+use crate::operator::{BLOCK, StiffModes};
 use crate::team::{Team, blocks};
 
 /// How A x = b is solved.

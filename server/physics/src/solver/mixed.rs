@@ -14,7 +14,7 @@
 use nalgebra::Vector3;
 
 use super::newton::{Curvature, Newton, NewtonReport, Potential, ROUNDING};
-use crate::operator::FixedCopy;
+use crate::element::FixedCopy;
 use crate::team::Team;
 use crate::team::phase::Phase;
 

@@ -11,7 +11,8 @@ use nalgebra::Vector3;
 use super::linear::{LinearSettings, LinearSolver, Method};
 use super::report::StopReason;
 use crate::assembly::BlockCsr;
-use crate::operator::{FixedCopy, StiffModes};
+use crate::element::FixedCopy;
+use crate::operator::StiffModes;
 use crate::team::Team;
 use crate::team::phase::Phase;
 

@@ -8,7 +8,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::block_jacobi::{DiagonalInverse, root};
 use super::constraint::Filter;
 use crate::assembly::BlockCsr;
-use crate::operator::{Held, StiffModes, Substitution};
+use crate::element::Held;
+use crate::operator::{StiffModes, Substitution};
 
 /// A substitution T, found anew whenever other copies are held.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]

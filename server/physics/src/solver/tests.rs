@@ -9,7 +9,7 @@ use super::{
     Precision, StopReason,
 };
 use crate::assembly::BlockCsr;
-use crate::operator::{FixedCopy, Held};
+use crate::element::{FixedCopy, Held};
 use crate::team::Team;
 
 const ALL: [(Method, Precision); 6] = [

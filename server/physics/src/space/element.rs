@@ -8,8 +8,9 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use smallvec::SmallVec;
 
-use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
+use crate::assembly::{Model, ModelError, Volumetric};
 use crate::cut::{CutMesh, NewCopy};
+use crate::element::ElementKind;
 use crate::element::{MaterialPoint, Point};
 use crate::material::{Material, Regions};
 use crate::mesh::TetMesh;

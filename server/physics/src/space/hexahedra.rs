@@ -4,8 +4,9 @@
 use nalgebra::Vector3;
 
 use super::element::Element;
-use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
+use crate::assembly::{Model, ModelError, Volumetric};
 use crate::cut::{CutMesh, Piece};
+use crate::element::ElementKind;
 use crate::element::{MaterialPoint, Point, deformation_gradient, hex8, quadrature};
 use crate::material::Material;
 use crate::mesh::{HexMesh, TetMesh};

@@ -3,8 +3,9 @@
 use nalgebra::Vector3;
 
 use super::element::Element;
-use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
+use crate::assembly::{Model, ModelError, Volumetric};
 use crate::cut::CutMesh;
+use crate::element::ElementKind;
 use crate::element::{Point, deformation_gradient};
 use crate::material::Material;
 use crate::mesh::TetMesh;

@@ -4,18 +4,19 @@
 //! stiffness, the solvers, the integrators and the body, which do not know what the elements are.
 
 pub(crate) mod deepest;
+mod cells;
 mod element;
 mod hexahedra;
 mod linear_tets;
 mod quadratic_tets;
 mod rest_point;
-pub mod skin;
 mod tets;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod quadratic_tests;
 
+pub use cells::{OctreeRefinement, OctreeSpace};
 pub use element::Element;
 pub use hexahedra::Hexahedra;
 pub use linear_tets::LinearTets;
@@ -28,15 +29,15 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
+use crate::assembly::{Model, ModelError, Volumetric};
 use crate::cut::{BladeSweep, Components, CutError, CutReport, Flaws, IncisionMark, Solid, Surface, Work};
+use crate::element::ElementKind;
 use crate::element::{MaterialPoint, Points, Simd};
 use crate::material::Material;
 use crate::mesh::MeshError;
-use crate::octree::OctreeSpace;
 use crate::operator::{StiffModes, Stiffness};
+use crate::skin::{Kept, OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::solver::multigrid::Hierarchy;
-use crate::space::skin::{Kept, OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::storage::saved::saved_as;
 use crate::team::Team;
 

@@ -9,10 +9,10 @@ use crate::assembly::{Model, Volumetric};
 use crate::cut::BladeSweep;
 use crate::element::quadrature::tet_degree_5;
 use crate::element::tet10;
+use crate::element::{FixedCopy, Held};
 use crate::integrator::{StaticProblem, find_equilibrium};
 use crate::material::{Law, Material, Rayleigh};
 use crate::mesh::{BoxPattern, TET_FACES, box_mesh};
-use crate::operator::{FixedCopy, Held};
 use crate::solver::{
     Curvature, LinearSettings, LinearSolver, Method, Newton, NewtonSettings, Precision, StopReason,
 };

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::element::Element;
-use crate::assembly::{ElementKind, Model, ModelError, QuadraticPiece, Volumetric};
+use crate::assembly::{Model, ModelError, QuadraticPiece, Volumetric};
 use crate::cut::middles::MiddleCopies;
 use crate::cut::{CutMesh, NewCopy, Piece};
+use crate::element::ElementKind;
 use crate::element::{Point, TET_EDGES, deformation_gradient, piece_rule, quadrature, tet10};
 use crate::material::{Material, Regions};
 use crate::mesh::{Tet10Mesh, TetMesh};

@@ -7,20 +7,21 @@ use nalgebra::Vector3;
 
 use super::deepest::{self, Bounds, deepest_of};
 use super::{Element, Hexahedra, LinearTets, QuadraticTets, RestPoint, Space, VisitPiece};
-use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
+use crate::assembly::{Model, ModelError, Volumetric};
 use crate::cut::remesh::{Nodes, SnapCut, SnapReport, Snapper};
 use crate::cut::{
     BladeSweep, Components, CutError, CutLimits, CutMesh, CutReport, Flaws, FrontRule, IncisionMark, Piece,
     Solid, Surface, SweepUnderWay, Work, swept_area,
 };
+use crate::element::ElementKind;
 use crate::element::{MaterialPoint, Point, Points, Simd};
 use crate::material::{Lame, Material, Region, Regions, RegionsError};
 use crate::mesh::{HexMesh, MeshError, TetMesh};
 use crate::octree::Octree;
 use crate::operator::cells::CellStiffness;
 use crate::operator::{Elastic, StiffModes, Stiffness, degenerate_elements};
+use crate::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::solver::multigrid::Hierarchy;
-use crate::space::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::team::Team;
 
 /// Distance, relative to the element, by which a point is moved towards its side before its piece is looked

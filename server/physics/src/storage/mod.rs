@@ -5,5 +5,7 @@ pub mod bits;
 pub mod disjoint;
 pub mod jagged;
 pub mod numbering;
+pub mod padded;
 pub mod reserve;
 pub mod saved;
+pub mod sync;

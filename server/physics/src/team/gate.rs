@@ -5,7 +5,7 @@
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::sync::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use crate::storage::sync::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 type Job = *const (dyn Fn(usize) + Sync);
 

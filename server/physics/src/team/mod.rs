@@ -22,7 +22,7 @@ pub use blocks::{Blocks, BlocksMut, RangesMut, blocks, ranges};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::sync::{Arc, AtomicBool, Ordering, SPINS_BEFORE_YIELD, spin_loop, thread};
+use crate::storage::sync::{Arc, AtomicBool, Ordering, SPINS_BEFORE_YIELD, spin_loop, thread};
 use crate::team::phase::{Marks, Phase, PhaseMark};
 
 use gate::Gate;

@@ -3,7 +3,7 @@
 use std::sync::Barrier;
 
 use super::*;
-use crate::sync::AtomicUsize;
+use crate::storage::sync::AtomicUsize;
 
 #[test]
 fn every_block_is_visited_once_by_any_number_of_members() {

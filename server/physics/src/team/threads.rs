@@ -1,7 +1,9 @@
 //! The threads that serve one team, or several that work side by side.
 
 use super::gate::Gate;
-use crate::sync::{Arc, AtomicBool, LOOKS_BEFORE_SLEEP, LOOKS_BEFORE_WANDERING, Ordering, spin_loop, thread};
+use crate::storage::sync::{
+    Arc, AtomicBool, LOOKS_BEFORE_SLEEP, LOOKS_BEFORE_WANDERING, Ordering, spin_loop, thread,
+};
 
 /// Threads, and the gates of the teams that they serve.
 #[derive(Debug)]

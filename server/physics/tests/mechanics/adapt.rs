@@ -8,7 +8,8 @@ use scindo_physics::body::{
 };
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
-use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeSettings};
+use scindo_physics::space::OctreeSpace;
 
 use crate::{SOFT, bar_mesh, settings};
 

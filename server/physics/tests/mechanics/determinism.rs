@@ -8,7 +8,8 @@ use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::{MaterialPoint, Simd};
 use scindo_physics::material::{Law, Material, Rayleigh, Tangent};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
+use scindo_physics::space::OctreeSpace;
 use scindo_physics::team::Team;
 
 use crate::{DOWN, SOFT, bar_mesh, left_face, settings};

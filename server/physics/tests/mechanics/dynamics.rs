@@ -6,13 +6,13 @@ use scindo_physics::assembly::pressure::Pressure;
 use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::body::{PointSpring, SpringKind};
 use scindo_physics::cut::{BladeSweep, CutMesh};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::element::MaterialPoint;
 use scindo_physics::integrator::{
     Dynamics, DynamicsSettings, LooseParts, MassKind, Notice, Outcome, Scheme, SolveReport, State, StepInputs,
 };
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{LinearSettings, Method, NewtonSettings};
 use scindo_physics::team::Team;
 

@@ -4,16 +4,17 @@ use std::any::Any;
 use std::borrow::Cow;
 
 use nalgebra::{Matrix3, Vector3};
-use scindo_physics::assembly::{ElementKind, Model, ModelError, Volumetric};
+use scindo_physics::assembly::{Model, ModelError, Volumetric};
 use scindo_physics::body::{Body, BodySettings, CuttingMethod, OperatorChoice, Scheme};
 use scindo_physics::cut::{
     BladeSweep, Components, CutError, CutMesh, CutReport, Flaws, IncisionMark, Solid, Surface, Work,
 };
+use scindo_physics::element::ElementKind;
 use scindo_physics::element::{Point, Points, Simd};
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, MeshError, TetMesh, box_mesh};
 use scindo_physics::operator::{Block6, Direction, ElasticUpdate, Padded, Place, StiffModes, Stiffness};
-use scindo_physics::space::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
+use scindo_physics::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use scindo_physics::space::{RestPoint, Space, Tets, VisitPiece};
 use scindo_physics::team::Team;
 

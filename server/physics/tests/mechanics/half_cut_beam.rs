@@ -5,10 +5,10 @@ use nalgebra::Vector3;
 use scindo_allocations::allocations;
 use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::cut::{BladeSweep, CutMesh};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::integrator::{StaticProblem, find_equilibrium};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{
     Curvature, LinearSettings, Method, Newton, NewtonReport, NewtonSettings, Precision, StopReason,
 };

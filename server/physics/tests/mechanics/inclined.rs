@@ -5,10 +5,11 @@ use scindo_allocations::allocations;
 use scindo_physics::body::{
     Arithmetic, Body, BodySettings, ElementKind, Method, Outcome, PcgSettings, Scheme,
 };
+use scindo_physics::element::Held;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
-use scindo_physics::operator::Held;
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
+use scindo_physics::space::OctreeSpace;
 
 use crate::SOFT;
 

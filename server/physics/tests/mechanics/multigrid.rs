@@ -9,8 +9,9 @@ use scindo_physics::body::{
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
 use scindo_physics::solver::multigrid::CoarsestSolve;
+use scindo_physics::space::OctreeSpace;
 
 const MATERIAL: Material = Material {
     young_pa: 2e5,

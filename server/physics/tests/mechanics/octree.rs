@@ -8,7 +8,8 @@ use scindo_physics::cut::{BladeSweep, SolidCells};
 use scindo_physics::integrator::LooseParts;
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
 use scindo_physics::mesh::box_hexes;
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
+use scindo_physics::space::OctreeSpace;
 use scindo_physics::space::Space;
 use scindo_physics::team::Team;
 

@@ -10,8 +10,9 @@ use scindo_physics::body::{
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
 use scindo_physics::solver::StopReason;
+use scindo_physics::space::OctreeSpace;
 
 /// Soft enough to hang down from the wall at its own weight.
 const MATERIAL: Material = Material {

@@ -11,7 +11,8 @@ use scindo_physics::body::{
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_hexes, box_mesh};
-use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeSettings, OctreeSpace, Shape};
+use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeSettings, Shape};
+use scindo_physics::space::OctreeSpace;
 
 use crate::{SOFT, cube, settings};
 

@@ -2,12 +2,13 @@
 
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
-use scindo_physics::assembly::{ElementKind, Model, ModelError, Volumetric};
+use scindo_physics::assembly::{Model, ModelError, Volumetric};
 use scindo_physics::body::estimate::StressRecovery;
 use scindo_physics::body::{
     Arithmetic, Body, BodyError, BodySettings, CuttingMethod, Outcome, PcgSettings, Scheme,
 };
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::element::ElementKind;
 use scindo_physics::material::{Law, Material, Rayleigh, Region, Regions, RegionsError};
 use scindo_physics::mesh::{BoxPattern, HexMesh, TetMesh, box_hexes, box_mesh};
 use scindo_physics::space::Tets;

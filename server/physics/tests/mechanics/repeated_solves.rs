@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use scindo_allocations::allocations;
 use scindo_physics::assembly::{Model, Tangent, Volumetric};
 use scindo_physics::body::estimate::StressRecovery;
+use scindo_physics::element::FixedCopy;
 use scindo_physics::integrator::{Relaxation, StaticProblem, find_equilibrium};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{
     LinearSettings, LinearSolver, Method, Newton, NewtonSettings, Precision, StopReason,
 };

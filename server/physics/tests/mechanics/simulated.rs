@@ -9,7 +9,8 @@ use scindo_physics::body::{
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
+use scindo_physics::space::OctreeSpace;
 
 type V3 = Vector3<f64>;
 

@@ -10,7 +10,8 @@ use scindo_physics::body::{
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Prony, PronyTerm, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
-use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeSettings};
+use scindo_physics::space::OctreeSpace;
 
 const SIDE: f64 = 0.2;
 const TERMS: [PronyTerm; 2] = [PronyTerm { ratio: 0.8, time_s: 0.1 }, PronyTerm { ratio: 0.5, time_s: 1.5 }];

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, Outcome, PcgSettings};
 use scindo_physics::material::{Law, Material};
-use scindo_physics::octree::OctreeSpace;
 use scindo_physics::solver::Method;
+use scindo_physics::space::OctreeSpace;
 
 use super::model::{Grid, Model, cube};
 use super::system::MATERIAL;

@@ -7,8 +7,9 @@ use nalgebra::{Rotation3, Vector3};
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::Simd;
 use scindo_physics::material::Region;
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace, Shape};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, Shape};
 use scindo_physics::operator::cells::CellStiffness;
+use scindo_physics::space::OctreeSpace;
 use scindo_physics::team::Team;
 
 use super::Trouble;

@@ -18,7 +18,8 @@ use scindo_physics::cut::BladeSweep;
 use scindo_physics::integrator::omega_max;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
+use scindo_physics::space::OctreeSpace;
 use scindo_physics::space::Tets;
 use scindo_physics::team::Team;
 

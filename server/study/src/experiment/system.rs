@@ -6,13 +6,12 @@
 use std::time::Instant;
 
 use nalgebra::{Matrix3, Vector3};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::element::{Points, Simd};
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
 use scindo_physics::octree::Octree;
 use scindo_physics::operator::cells::CellStiffness;
-use scindo_physics::operator::{
-    BLOCK, BlockJacobi, ElasticUpdate, FixedCopy, Padded, Stiffness, SystemOperator,
-};
+use scindo_physics::operator::{BLOCK, BlockJacobi, ElasticUpdate, Padded, Stiffness, SystemOperator};
 use scindo_physics::solver::multigrid::{
     CellMaterial, Coefficients, Hierarchy, Multigrid, MultigridSettings, Smoother,
 };

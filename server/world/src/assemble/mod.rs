@@ -19,7 +19,7 @@ use scindo_physics::body::{Arithmetic, Body, BodyError, BodySettings, Constants}
 use scindo_physics::element::Simd;
 use scindo_physics::material::{Material, MaterialError, Rayleigh, Regions};
 use scindo_physics::mesh::HexMesh;
-use scindo_physics::octree::OctreeSpace;
+use scindo_physics::space::OctreeSpace;
 use scindo_physics::space::Tets;
 use scindo_physics::team::Lead;
 

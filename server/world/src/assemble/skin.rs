@@ -7,8 +7,8 @@ use std::path::Path;
 use nalgebra::Vector3;
 use scindo_collision::SurfaceBvh;
 use scindo_physics::body::Body;
+use scindo_physics::skin::{Kept, Landing, OwnSurface, SkinSettings};
 use scindo_physics::space::Tets;
-use scindo_physics::space::skin::{Kept, Landing, OwnSurface, SkinSettings};
 
 use super::mesh::fault;
 use crate::format::{MeshFile, SurfaceMesh, read_mesh};

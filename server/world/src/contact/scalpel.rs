@@ -4,7 +4,7 @@
 //! Jeřábková 2007, 4.1.3 and fig. 4.7: cut path on the surface and depth below it make the wound.
 
 use nalgebra::Vector3;
-use scindo_physics::space::skin::{Penetration, incision};
+use scindo_physics::skin::{Penetration, incision};
 
 use super::press::Press;
 use crate::tool::Tool;

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, ElementKind, Volumetric};
 use scindo_physics::material::Regions;
 use scindo_physics::mesh::TetMesh;
-use scindo_physics::octree::OctreeSpace;
+use scindo_physics::space::OctreeSpace;
 use scindo_physics::space::Tets;
 
 use super::{BodyForecast, Effort, Ending, Run, Source};

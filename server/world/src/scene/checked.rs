@@ -2,8 +2,8 @@
 
 use nalgebra::{Unit, Vector3};
 use scindo_collision::Method;
+use scindo_physics::element::Held;
 use scindo_physics::octree::AdaptSettings;
-use scindo_physics::operator::Held;
 
 use super::course::Course;
 use super::mechanics::Mechanics;

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use scindo_physics::cut::{BladeSweep, CutReport, MAX_SEGMENTS, Work};
-use scindo_physics::space::skin::Skin;
+use scindo_physics::skin::Skin;
 
 use super::incision::incision_along;
 use super::undo::{History, Undone};

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use scindo_collision::SurfaceBvh;
 use scindo_physics::cut::BladeSweep;
-use scindo_physics::space::skin::{Penetration, incision};
+use scindo_physics::skin::{Penetration, incision};
 
 use crate::body::SimBody;
 

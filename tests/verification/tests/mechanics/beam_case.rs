@@ -2,9 +2,10 @@
 //! The symmetry plane is held along y. References: `tests/reference/R2`.
 
 use nalgebra::Vector3;
-use scindo_physics::assembly::{ElementKind, Model};
+use scindo_physics::assembly::Model;
+use scindo_physics::element::ElementKind;
+use scindo_physics::element::FixedCopy;
 use scindo_physics::material::Law;
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::Method;
 
 use crate::support::{clamped, equilibrium_by, held};

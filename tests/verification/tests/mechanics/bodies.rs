@@ -3,13 +3,13 @@
 use nalgebra::Vector3;
 use scindo_physics::assembly::pressure::Pressure;
 use scindo_physics::assembly::{Model, Volumetric};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::integrator::{
     Dynamics, DynamicsSettings, LooseParts, MassKind, Outcome, Scheme, SolveReport, State, StepInputs,
     omega_max,
 };
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{LinearSettings, Method, NewtonSettings, Precision};
 use scindo_physics::team::Team;
 

@@ -9,10 +9,10 @@
 use nalgebra::{Matrix4, Vector3, Vector4};
 use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::cut::{BladeSweep, CutMesh};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::integrator::{StaticProblem, find_equilibrium};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{
     Curvature, LinearSettings, Method, Newton, NewtonSettings, Precision, StopReason,
 };

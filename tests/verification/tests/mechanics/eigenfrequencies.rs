@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 use scindo_physics::assembly::{Model, Tangent, Volumetric};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{EigenError, EigenSettings, Modes, natural_frequencies};
 use scindo_physics::team::Team;
 use serde_json::Value;

@@ -4,10 +4,10 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use scindo_physics::assembly::{BlockCsr, Model, Tangent, Volumetric};
 use scindo_physics::cut::enrichment::{EnrichedTet, EnrichedView, Enrichment, Side, UA, thesis_claims};
 use scindo_physics::cut::{BladeSweep, CutMesh};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::integrator::StaticProblem;
 use scindo_physics::material::Law;
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{
     Curvature, LinearSettings, LinearSolver, Method, Newton, NewtonSettings, Potential, Precision, StopReason,
 };

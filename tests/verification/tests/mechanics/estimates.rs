@@ -5,10 +5,10 @@ use scindo_physics::assembly::{Model, Tangent, Volumetric};
 use scindo_physics::body::estimate::{CutTets, MeshError, StressRecovery, Tets};
 use scindo_physics::body::{Body, BodySettings};
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::element::FixedCopy;
 use scindo_physics::element::quadrature::tet_degree_5;
 use scindo_physics::material::{Lame, Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{LinearSettings, LinearSolver, Method, StopReason};
 use scindo_physics::team::Team;
 

@@ -3,9 +3,9 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use scindo_physics::assembly::{Model, Volumetric};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::material::{Fibre, Fibres, Law};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
-use scindo_physics::operator::FixedCopy;
 
 use crate::support::{equilibrium, held, material};
 

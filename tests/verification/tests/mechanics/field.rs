@@ -1,7 +1,8 @@
 //! Integrals over the elements of a model: loads of a body force, errors of a solution.
 
 use nalgebra::Vector3;
-use scindo_physics::assembly::{ElementKind, Model};
+use scindo_physics::assembly::Model;
+use scindo_physics::element::ElementKind;
 use scindo_physics::element::{hex8, quadrature, tet10};
 
 /// A point of an element: shape functions of its nodes, rest position [m], weight [m³].

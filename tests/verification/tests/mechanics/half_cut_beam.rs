@@ -5,7 +5,8 @@
 //! quadratic tetrahedra and hexahedra is in the mesh: nodes at its face exist twice.
 
 use nalgebra::Vector3;
-use scindo_physics::assembly::{ElementKind, Model, Volumetric};
+use scindo_physics::assembly::{Model, Volumetric};
+use scindo_physics::element::ElementKind;
 use scindo_physics::material::Law;
 use scindo_physics::mesh::{BoxPattern, box_mesh, graded_hexes};
 use scindo_physics::solver::Method;

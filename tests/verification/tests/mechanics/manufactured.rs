@@ -6,10 +6,11 @@
 //! displacement in L2: polynomial degree + 1.
 
 use nalgebra::{Matrix3, Vector3};
-use scindo_physics::assembly::{ElementKind, Model, Volumetric};
+use scindo_physics::assembly::{Model, Volumetric};
+use scindo_physics::element::ElementKind;
+use scindo_physics::element::FixedCopy;
 use scindo_physics::material::{Lame, Law};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
-use scindo_physics::operator::FixedCopy;
 
 use crate::field::{consistent_load, l2_error};
 use crate::support::{equilibrium, held, material};

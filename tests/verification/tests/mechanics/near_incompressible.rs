@@ -3,10 +3,10 @@
 
 use nalgebra::Vector3;
 use scindo_physics::assembly::{Model, Volumetric};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::integrator::{StaticProblem, find_equilibrium};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_hexes, box_mesh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{
     Curvature, LinearSettings, Method, Newton, NewtonReport, NewtonSettings, Precision, StopReason,
 };

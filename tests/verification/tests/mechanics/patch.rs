@@ -4,9 +4,9 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::cut::{BladeSweep, CutMesh};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::material::Law;
 use scindo_physics::mesh::{BoxPattern, HexMesh, TetMesh, box_hexes, box_mesh};
-use scindo_physics::operator::FixedCopy;
 
 use crate::support::{equilibrium, held, material};
 

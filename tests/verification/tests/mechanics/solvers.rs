@@ -2,10 +2,10 @@
 
 use nalgebra::Vector3;
 use scindo_physics::assembly::{BlockCsr, Model, Tangent, Volumetric};
+use scindo_physics::element::FixedCopy;
 use scindo_physics::integrator::{Relaxation, StaticProblem, find_equilibrium};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{
     Curvature, LinearReport, LinearSettings, LinearSolver, Method, Newton, NewtonReport, NewtonSettings,
     Precision, StopReason,

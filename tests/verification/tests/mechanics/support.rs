@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use scindo_physics::assembly::Model;
+use scindo_physics::element::FixedCopy;
 use scindo_physics::integrator::{StaticProblem, find_equilibrium};
 use scindo_physics::material::{Law, Material, Rayleigh};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{
     Curvature, LinearSettings, Method, Newton, NewtonSettings, Precision, StopReason,
 };

@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
-use crate::assembly::{ElementKind, Model};
+use crate::assembly::Model;
 use crate::cut::Piece;
+use crate::element::ElementKind;
 use crate::material::{Lame, Regions};
 use crate::mesh::TetMesh;
 

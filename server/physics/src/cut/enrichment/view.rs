@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Vector3};
 use super::{Enrichment, Side};
 use crate::assembly::BlockCsr;
 use crate::cut::CutMesh;
-use crate::operator::{FixedCopy, Held};
+use crate::element::{FixedCopy, Held};
 
 /// The linear map q = C p between the positions q of the copies of a body and the degrees of freedom
 /// p = [X + u; a] of an enrichment.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::operator::Held;
+use crate::element::Held;
 
 /// Origin of a node that did not exist before the cut.
 pub const NEW: u32 = u32::MAX;

@@ -18,10 +18,10 @@ use nalgebra::{Matrix3, Matrix4, Vector2, Vector3, Vector4};
 
 use super::detect::Deformed;
 use super::sweep_triangle::SweepTriangle;
-use crate::assembly::ElementKind;
 use crate::cut::topology::crossings::{Crossings, edge_key};
 use crate::cut::topology::fragments::{FragmentVertex, Fragments, NONE};
 use crate::cut::topology::incision_sets::IncisionSets;
+use crate::element::ElementKind;
 use crate::mesh::{TET_EDGES, TET_FACES};
 
 /// How far an incision goes on ahead of the blade.

@@ -25,7 +25,7 @@ use super::mosaic::{Mosaic, Source};
 use super::place::{Crossing, bind};
 use crate::cut::Surface;
 use crate::element::MaterialPoint;
-use crate::space::skin::{Ground, Kept, Laid, LaidPoint, OwnSurface, SkinError, SkinShape};
+use crate::skin::{Ground, Kept, Laid, LaidPoint, OwnSurface, SkinError, SkinShape};
 
 /// The surface of an octree body with the triangles of another surface.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]

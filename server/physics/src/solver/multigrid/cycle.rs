@@ -12,9 +12,10 @@ use super::lanczos::{factor, largest_ritz_value};
 use super::matrices::CellMatrix;
 use super::smoother::{Diagonal, Smoother, Smoothing, Stage, chebyshev, degree_on, gauss_seidel, subtract};
 use super::stiff_springs::{Columns, SpringBlocks, Sprung};
+use crate::element::FixedCopy;
 use crate::element::Simd;
 use crate::octree::Octree;
-use crate::operator::{BLOCK, FixedCopy, Inverse3, LinearOperator, Padded, Spring, block_of, filter, rows};
+use crate::operator::{BLOCK, Inverse3, LinearOperator, Padded, Spring, block_of, filter, rows};
 use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 

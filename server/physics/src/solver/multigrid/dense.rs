@@ -7,8 +7,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::element::Held;
 use crate::element::{LANES, Lanes, Vector8, for_eight};
-use crate::operator::Held;
 use crate::operator::cells::{ENTRY, Matrix24};
 
 /// Row c: weights of the new vertices in vertex c.

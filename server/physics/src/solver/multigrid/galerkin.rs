@@ -21,10 +21,11 @@ use super::refresh::Context;
 use super::table;
 use super::thin::is_thin;
 use crate::element::Simd;
+use crate::element::{FixedCopy, Held};
 use crate::material::Lame;
 use crate::octree::corner_shares;
+use crate::operator::BLOCK;
 use crate::operator::cells::unit_stiffness;
-use crate::operator::{BLOCK, FixedCopy, Held};
 use crate::team::{Team, blocks};
 
 /// Stored cells per unit of work.

@@ -10,8 +10,8 @@ use super::matrices::{
     CellMatrix, INCLINED, LevelMatrices, Rotation, SAME, Stored, Within, cell_matrix, weights,
 };
 use super::thin::{Equations, Thin, is_thin};
+use crate::element::Held;
 use crate::element::{Lanes, Simd, Vector8};
-use crate::operator::Held;
 
 /// What the matrices of level `l` are computed from.
 pub struct Context<'a> {

@@ -19,10 +19,10 @@ use super::level::NONE;
 use super::matrices::INCLINED;
 use super::precondition::Cycle;
 use super::restricted::RestrictedSprings;
+use crate::element::{FixedCopy, Held};
 use crate::octree::Octree;
 use crate::operator::{
-    BlockJacobi, FixedCopy, Held, LinearOperator, Padded, Preconditioner, Spring, filter, filter_block,
-    invert, invert_free,
+    BlockJacobi, LinearOperator, Padded, Preconditioner, Spring, filter, filter_block, invert, invert_free,
 };
 use crate::team::Team;
 

@@ -7,8 +7,8 @@ use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
 use super::matrices::{CellMatrix, INCLINED, LevelMatrices, Rotation, shared_matrix};
 use super::thin::is_thin;
+use crate::element::FixedCopy;
 use crate::octree::corner_shares;
-use crate::operator::FixedCopy;
 use crate::storage::bits::Bits;
 
 impl Galerkin {

@@ -1,8 +1,9 @@
 //! Block-Jacobi with a coarse space.
 
 use super::space::CoarseSpace;
+use crate::element::FixedCopy;
 use crate::operator::{
-    BLOCK, BlockJacobi, FixedCopy, Iterate, LinearOperator, Padded, Preconditioner, block_of, filter, rows,
+    BLOCK, BlockJacobi, Iterate, LinearOperator, Padded, Preconditioner, block_of, filter, rows,
 };
 use crate::team::{Team, blocks};
 

@@ -7,9 +7,10 @@ use super::interpolation::Interpolation;
 use super::lattice::Lattice;
 use super::parts::Parts;
 use super::system::CoarseSystem;
+use crate::element::Held;
 use crate::element::Points;
 use crate::material::{Lame, Material};
-use crate::operator::{Held, Padded, Spring};
+use crate::operator::{Padded, Spring};
 use crate::team::Team;
 
 /// Edge of a lattice cell over the mean distance of nodes. With 3 a converged step of 12 800 to 492 000 tetrahedra

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::operator::{Block6, FixedCopy, Spring};
+use crate::element::FixedCopy;
+use crate::operator::{Block6, Spring};
 
 /// A = `mass_factor` M + `scale` K̂ + springs at some positions, as far as a coarse space needs it.
 #[derive(Clone, Copy, Debug)]

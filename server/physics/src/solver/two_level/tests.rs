@@ -6,12 +6,13 @@ use super::interpolation::Interpolation;
 use super::lattice::Lattice;
 use super::{CoarseSpace, CoarseSystem, TwoLevel};
 use crate::cut::{BladeSweep, CutMesh};
+use crate::element::{FixedCopy, Held};
 use crate::element::{MaterialPoint, Points, Simd};
 use crate::material::{Law, Material, Rayleigh};
 use crate::mesh::{BoxPattern, box_mesh};
 use crate::operator::{
-    BLOCK, BlockJacobi, Elastic, ElasticUpdate, FixedCopy, Held, LinearOperator, Padded, Preconditioner,
-    Spring, SystemOperator, filter,
+    BLOCK, BlockJacobi, Elastic, ElasticUpdate, LinearOperator, Padded, Preconditioner, Spring,
+    SystemOperator, filter,
 };
 use crate::space::{Space, Tets};
 use crate::team::Team;

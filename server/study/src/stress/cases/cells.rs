@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 
 use scindo_physics::body::{Body, BodySettings, PcgSettings};
 use scindo_physics::cut::BladeSweep;
-use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeError, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeError, OctreeSettings};
+use scindo_physics::space::OctreeSpace;
 use scindo_physics::team::Team;
 
 use super::flaws::tell;

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use scindo_physics::element::Points;
-use scindo_physics::octree::{At, CutLink, Octree, OctreeSpace};
+use scindo_physics::octree::{At, CutLink, Octree};
 use scindo_physics::solver::multigrid::{Hierarchy, MultigridSettings};
+use scindo_physics::space::OctreeSpace;
 use scindo_physics::space::Space;
 use scindo_physics::team::Team;
 

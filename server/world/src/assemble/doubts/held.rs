@@ -1,7 +1,7 @@
 //! Bodies and parts that nothing holds.
 
 use nalgebra::Vector3;
-use scindo_physics::operator::Held;
+use scindo_physics::element::Held;
 
 use crate::body::SimBody;
 use crate::quantity::{mass, percent};

@@ -1,7 +1,7 @@
 //! The directions in which a fix holds its nodes.
 
 use nalgebra::Vector3;
-use scindo_physics::operator::Held;
+use scindo_physics::element::Held;
 
 use super::super::raw::{RawAxes, RawBody, RawFix};
 use super::Check;

@@ -132,7 +132,7 @@ fn held_nodes_stay_and_loads_keep_their_sum() {
     let mut sample = Sample::unit(4);
     for node in &mut sample.nodes {
         node.point_force = v(1.0, 2.0, 3.0);
-        node.fixed = (node.rest.z == 0.0).then_some((crate::operator::Held::FULLY, Vector3::zeros()));
+        node.fixed = (node.rest.z == 0.0).then_some((crate::element::Held::FULLY, Vector3::zeros()));
     }
     let before: Vector3<f64> = sample.nodes.iter().map(|n| n.point_force).sum();
     let held: Vec<_> = sample.nodes.iter().filter(|n| n.fixed.is_some()).map(|n| n.rest).collect();

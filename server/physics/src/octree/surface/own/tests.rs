@@ -4,8 +4,8 @@ use super::super::super::*;
 use super::super::tests::{Ball, Disc, Random, check_parts, triangles};
 use super::*;
 use crate::cut::BladeSweep;
-use crate::space::Space;
-use crate::space::skin::{Landing, SkinSettings};
+use crate::skin::{Landing, SkinSettings};
+use crate::space::{OctreeSpace, Space};
 use crate::team::Team;
 
 /// A surface with its vertices [m].

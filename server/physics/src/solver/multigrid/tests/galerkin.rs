@@ -6,8 +6,9 @@ use nalgebra::{Matrix3, Rotation3};
 
 use super::levels::random_cuts;
 use super::support::{Exact, V3, blade_grid, clamped, coefficients, cube, dot, vector};
+use crate::element::FixedCopy;
 use crate::octree::Octree;
-use crate::operator::{FixedCopy, Inverse3, padded};
+use crate::operator::{Inverse3, padded};
 use crate::solver::multigrid::galerkin::Galerkin;
 use crate::solver::multigrid::level::Level;
 use crate::solver::multigrid::matrices::CellMatrix;

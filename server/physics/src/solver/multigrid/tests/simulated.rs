@@ -1,9 +1,8 @@
 use super::support::{Exact, V3, blade_grid, clamped, coefficients, cube, vector};
+use crate::element::FixedCopy;
 use crate::element::MaterialPoint;
 use crate::octree::Octree;
-use crate::operator::{
-    BLOCK, FixedCopy, LinearOperator, Padded, Preconditioner, Spring, filter, padded, unpadded,
-};
+use crate::operator::{BLOCK, LinearOperator, Padded, Preconditioner, Spring, filter, padded, unpadded};
 use crate::solver::multigrid::{Composite, Hierarchy, MultigridSettings};
 use crate::solver::{Pcg, PcgSettings, StopReason};
 use crate::team::Team;

@@ -3,15 +3,17 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::cut::BladeSweep;
+use crate::element::FixedCopy;
 use crate::material::Lame;
-use crate::octree::{BoxShape, CutLink, LinkKey, Octree, OctreeSettings, OctreeSpace, corner_weights};
+use crate::octree::{BoxShape, CutLink, LinkKey, Octree, OctreeSettings, corner_weights};
 use crate::operator::cells::unit_stiffness;
 use crate::operator::{
-    BlockJacobi, FixedCopy, Inverse3, LinearOperator, Padded, Preconditioner, Spring, filter, invert, padded,
+    BlockJacobi, Inverse3, LinearOperator, Padded, Preconditioner, Spring, filter, invert, padded,
 };
 use crate::solver::multigrid::galerkin::Galerkin;
 use crate::solver::multigrid::operator::CellProducts;
 use crate::solver::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
+use crate::space::OctreeSpace;
 use crate::space::Space;
 use crate::team::Team;
 

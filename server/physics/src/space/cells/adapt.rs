@@ -1,11 +1,9 @@
 //! Refinement and coarsening of the octree of a body.
 
-use super::adapt::{Activity, AdaptSettings, Plan};
-use super::change::OctreeChange;
-use super::coarsen::{Coarsening, Family};
-use super::space::OctreeSpace;
+use super::OctreeSpace;
 use crate::cut::{Front, NewCopy};
 use crate::element::MaterialPoint;
+use crate::octree::{Activity, AdaptSettings, Coarsening, Family, OctreeChange, Plan};
 
 /// What a refinement did.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,30 +1,32 @@
 //! The octree as a discretisation of a body.
 
+mod adapt;
+mod skin_faces;
+
+pub use adapt::OctreeRefinement;
+
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::blade::swept_box;
-use super::cells::Octree;
-use super::change::OctreeChange;
-use super::link_map::{CutLink, LinkKey};
-use super::near::{LeafRuns, VertexBoxes};
-use super::surface::{OctreeSurface, OwnSkin};
-use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
+use crate::assembly::{Model, ModelError, Volumetric};
 use crate::cut::{
     BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Solid, Surface,
     Surroundings, Work, sweep_from_behind, swept_area,
 };
+use crate::element::ElementKind;
 use crate::element::{MaterialPoint, Point, Points, Simd};
 use crate::material::{Lame, Material, Region};
 use crate::mesh::MeshError;
+use crate::octree::near::{LeafRuns, VertexBoxes};
+use crate::octree::{CutLink, LinkKey, OUTSIDE, Octree, OctreeChange, OctreeSurface, OwnSkin, swept_box};
 use crate::operator::cells::CellStiffness;
 use crate::operator::{StiffModes, Stiffness};
+use crate::skin::{Kept, OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::solver::multigrid::Hierarchy;
 use crate::space::deepest::{Bounds, deepest_of};
-use crate::space::skin::{Kept, OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use crate::space::{RestPoint, Space, VisitPiece};
 use crate::team::Team;
 
@@ -47,27 +49,27 @@ const BEHIND: f64 = 0.25;
 /// An octree that is cut, with everything that a body asks of it.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct OctreeSpace {
-    pub(super) octree: Octree,
+    pub(crate) octree: Octree,
     /// The uncut state.
-    pub(super) initial: Arc<Octree>,
+    initial: Arc<Octree>,
     /// The first vertex at the lattice point of each vertex.
-    pub(super) node_of_copy: Vec<u32>,
-    pub(super) volumes: Vec<f64>,
+    node_of_copy: Vec<u32>,
+    volumes: Vec<f64>,
     /// Leaves that the last cut changed.
-    pub(super) changed: Vec<u32>,
+    changed: Vec<u32>,
     /// Vertices whose volume the last cut changed.
     reweighed: Vec<u32>,
     /// Whether the last change was a cut, which leaves the numbers of all earlier leaves.
-    pub(super) only_cut: bool,
-    pub(super) fronts: BTreeMap<u32, Front>,
-    pub(super) surface: OctreeSurface,
+    only_cut: bool,
+    fronts: BTreeMap<u32, Front>,
+    pub(crate) surface: OctreeSurface,
     /// The skin of the triangles of a surface, if the body has one.
-    pub(super) own: Option<OwnSkin>,
-    pub(super) epoch: u32,
+    pub(crate) own: Option<OwnSkin>,
+    epoch: u32,
     under_way: Option<(Vec<(LinkKey, CutLink)>, CutReport)>,
     /// Made by the first cut after leaves got other numbers.
     #[serde(skip)]
-    pub(super) runs: Option<LeafRuns>,
+    runs: Option<LeafRuns>,
 }
 
 impl OctreeSpace {
@@ -151,9 +153,9 @@ impl OctreeSpace {
         let octants = self.octree.octants(self.octree.points()[vertex as usize]);
         let mut leaves = octants.leaf;
         leaves.sort_unstable();
-        let mut last = super::OUTSIDE;
+        let mut last = OUTSIDE;
         for leaf in leaves {
-            if leaf != super::OUTSIDE && leaf != last {
+            if leaf != OUTSIDE && leaf != last {
                 visit(leaf);
             }
             last = leaf;
@@ -211,7 +213,7 @@ impl OctreeSpace {
     }
 
     /// Enters the new vertices of `change`; `known` were there before.
-    pub(super) fn number_copies(&mut self, known: u32, change: &OctreeChange) -> Vec<NewCopy> {
+    fn number_copies(&mut self, known: u32, change: &OctreeChange) -> Vec<NewCopy> {
         let mut new_copies = Vec::with_capacity(change.new_vertices.len());
         for (copy, between) in (known..).zip(&change.new_vertices) {
             let parent = between.main_copy();
@@ -459,7 +461,7 @@ impl Space for OctreeSpace {
         shape: &mut SkinShape<'_>,
     ) -> Result<(), SkinError> {
         let Some(own) = own else { return Ok(()) };
-        if !self.octree.links.is_empty() {
+        if !self.octree.cut_links().is_empty() {
             return Err(SkinError::AlreadyCut);
         }
         self.own = Some(OwnSkin::new(&self.octree, &self.surface, own, shape)?);

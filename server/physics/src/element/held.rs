@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, RealField, Vector3};
 
-use super::Padded;
+use crate::storage::padded::Padded;
 
 /// Directions closer than this (sine of the angle between them) count as the same one.
 const SAME_DIRECTION: f64 = 1e-6;
@@ -229,6 +229,17 @@ impl Held {
         let (P, H) = (self.filter(), self.projection());
         P * A * P + H * s
     }
+}
+
+/// A copy whose displacement is prescribed in some directions.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct FixedCopy {
+    /// Index of the copy.
+    pub copy: u32,
+    /// The prescribed directions.
+    pub held: Held,
+    /// Prescribed position [m]; only its part in the directions of `held` is used.
+    pub position_m: [f64; 3],
 }
 
 fn unit(v: Vector3<f64>) -> Option<Vector3<f64>> {

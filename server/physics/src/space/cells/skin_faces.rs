@@ -3,12 +3,9 @@
 //! They are steps where the boundary is inclined. The vector area Σ n A of steps is that of the surface between the same
 //! rims, so the resultant of a pressure is that on the surface, and its distribution is known to a cell.
 
-use super::cells::Octree;
-use super::lattice::OUTSIDE;
-use super::measures::FACES;
-use super::space::OctreeSpace;
-use super::vertices::corner_weights;
+use super::OctreeSpace;
 use crate::element::MaterialPoint;
+use crate::octree::{FACES, corner_weights};
 
 /// Corners of the face in direction `d`, counter-clockwise from outside.
 fn around(d: usize) -> [usize; 4] {
@@ -39,14 +36,6 @@ impl OctreeSpace {
                 }
             }
         }
-    }
-}
-
-impl Octree {
-    /// Whether the face of leaf `id` in direction `d` is on the boundary of the body.
-    pub(super) fn leads_out(&self, id: u32, d: usize) -> bool {
-        let cell = &self.cells[id as usize];
-        cell.cut >> d & 1 == 1 && self.leaf(Self::across(cell.at, d)) == OUTSIDE
     }
 }
 
