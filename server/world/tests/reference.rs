@@ -46,8 +46,11 @@ struct Table {
     prefixes: Vec<String>,
 }
 
-/// Whether `prefix` selects `key`. One that ends with a dot selects only what is below.
+/// Whether `prefix` selects `key`. One that ends with a dot selects only what is below, with a `$` only the key itself.
 fn selects(prefix: &str, key: &str) -> bool {
+    if let Some(alone) = prefix.strip_suffix('$') {
+        return key == alone;
+    }
     let rest = key.strip_prefix(prefix);
     rest.is_some_and(|rest| rest.is_empty() || prefix.ends_with('.') || rest.starts_with(['.', '[']))
 }
