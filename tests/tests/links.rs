@@ -10,9 +10,9 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
 }
 
-/// The Markdown files that git knows.
-fn files() -> Vec<PathBuf> {
-    let listed = Command::new("git").args(["ls-files", "*.md"]).current_dir(root()).output().unwrap();
+/// The files that git knows and that match `pattern`.
+fn files(pattern: &str) -> Vec<PathBuf> {
+    let listed = Command::new("git").args(["ls-files", pattern]).current_dir(root()).output().unwrap();
     let files: Vec<PathBuf> = String::from_utf8(listed.stdout).unwrap().lines().map(PathBuf::from).collect();
     assert!(files.len() > 20, "git lists {files:?}");
     // A file that was removed but not yet committed.
@@ -72,11 +72,39 @@ fn broken(file: &Path, text: &str) -> Vec<String> {
 #[test]
 fn every_link_of_every_page_leads_somewhere() {
     let mut found = Vec::new();
-    for file in files() {
+    for file in files("*.md") {
         let file = root().join(file);
         found.extend(broken(&file, &std::fs::read_to_string(&file).unwrap()));
     }
     assert!(found.is_empty(), "these links lead nowhere:\n{}", found.join("\n"));
+}
+
+/// The sources that `text` names in inline code, with a folder, and that no file of `known` ends with.
+fn unknown_sources(text: &str, known: &[PathBuf]) -> Vec<String> {
+    let joined = prose(text).collect::<Vec<_>>().join("\n");
+    let code = joined.split('`').skip(1).step_by(2);
+    let is_source = |name: &&str| {
+        let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "./_-".contains(c));
+        let ends = [".rs", ".ts", ".py", ".proto"].iter().any(|end| name.ends_with(end));
+        plain && ends && name.contains('/') && !name.contains("NAME")
+    };
+    code.filter(is_source)
+        .filter(|name| !known.iter().any(|file| file.ends_with(name)))
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn every_source_that_a_page_names_exists() {
+    let known = files("*");
+    for page in ["CONTRIBUTING.md", "README.md", "server/physics/README.md", "deploy/README.md"] {
+        let text = std::fs::read_to_string(root().join(page)).unwrap();
+        assert_eq!(unknown_sources(&text, &known), [""; 0], "{page}");
+    }
+    assert_eq!(
+        unknown_sources("`src/nowhere.rs`, `src/body/mod.rs`, `src/NAME.rs`", &known),
+        ["src/nowhere.rs"]
+    );
 }
 
 #[test]
