@@ -20,7 +20,7 @@ tar -xzf "$tarball" -C "$scratch/tree" --strip-components 1
 dpkg-deb -x "$deb" "$scratch/deb"
 
 for root in "$scratch/tree" "$scratch/deb/usr"; do
-  for file in bin/{scindo,scindo-view,scindo-haptic,scindo-igtl} share/man/man1/scindo{,-run,-view,-haptic,-igtl}.1.gz \
+  for file in bin/{scindo,scindo-papers,scindo-view,scindo-haptic,scindo-igtl} share/man/man1/scindo{,-run,-stress,-view,-haptic,-igtl}.1.gz \
     share/bash-completion/completions/scindo-haptic share/zsh/site-functions/_scindo \
     share/fish/vendor_completions.d/scindo-view.fish share/scindo/scenes/KEYS.md \
     share/scindo/scenes/first-cut.toml share/scindo/proto/scindo/v1/server.proto share/doc/scindo/LICENSE-MIT \
@@ -51,6 +51,7 @@ if command -v systemd-analyze >/dev/null; then
 fi
 [ "$(dpkg-deb -f "$deb" Version)" = "$("$bin/scindo" --version | cut -d' ' -f2)" ] || fail "version of the .deb"
 "$scratch/deb/usr/bin/scindo" check "$scratch/deb/etc/scindo/scene.toml" >/dev/null || fail "the scene of the unit"
+grep -q free-fall <<<"$("$scratch/tree/bin/scindo" stress --list)" || fail "scindo does not find scindo-papers beside it"
 bash -n "$scratch/tree/share/bash-completion/completions/scindo" || fail "completions for bash"
 
 # The demonstration from the unpacked tarball, its page fetched.

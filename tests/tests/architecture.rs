@@ -10,18 +10,35 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("scindo-physics", BTreeSet::new()),
         ("scindo-collision", BTreeSet::new()),
         ("scindo-world", BTreeSet::from(["scindo-physics", "scindo-collision"])),
-        ("scindo-study", BTreeSet::from(["scindo-world", "scindo-physics", "scindo-collision"])),
+        ("scindo-study", BTreeSet::from(["scindo-world", "scindo-physics"])),
         (
             "scindo",
-            // It knows the haptic client for `scindo haptics`, which holds the client against the world.
             BTreeSet::from([
                 "scindo-world",
                 "scindo-study",
                 "scindo-proto",
                 "scindo-view",
-                "scindo-haptic",
                 // For `scindo top`, which looks at a server as any client does.
                 "scindo-client",
+                "scindo-program",
+            ]),
+        ),
+        // Drills and papers hold server and haptic client against each other. No other crate knows them.
+        (
+            "scindo-drill",
+            BTreeSet::from(["scindo", "scindo-world", "scindo-haptic", "scindo-client", "scindo-proto"]),
+        ),
+        (
+            "scindo-papers",
+            BTreeSet::from([
+                "scindo",
+                "scindo-drill",
+                "scindo-study",
+                "scindo-world",
+                "scindo-physics",
+                "scindo-collision",
+                "scindo-haptic",
+                "scindo-proto",
                 "scindo-program",
             ]),
         ),

@@ -1,5 +1,7 @@
 //! What `scindo`, `scindo-view`, `scindo-haptic` and `scindo-igtl` share: version, log, completions and man pages.
 
+mod say;
+
 mod seldom;
 
 use std::io::{self, IsTerminal as _, Write as _};

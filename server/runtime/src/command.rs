@@ -4,15 +4,14 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use scindo_program::Manual;
+use scindo_study::Scenes;
 
 use crate::error::RuntimeError;
-use cli::{Cli, Command};
+use cli::{Cli, Command, Papers};
 
 pub mod cli;
 
-mod say;
-
-mod signals;
+pub mod signals;
 
 pub mod progress;
 
@@ -28,17 +27,11 @@ pub mod mesh;
 
 pub mod accuracy;
 
-mod study_progress;
+pub mod study_progress;
 
-pub mod stress;
-
-pub mod haptics;
-
-pub mod reliability;
+mod sibling;
 
 pub mod effects;
-
-pub mod book;
 
 pub mod certs;
 
@@ -60,11 +53,7 @@ pub fn main() -> ExitCode {
         Some(Command::Export(args)) => args.json,
         Some(Command::Check(args)) => args.json,
         Some(Command::Mesh(args)) => args.json,
-        Some(Command::Accuracy(args)) => args.json,
-        Some(Command::Stress(args)) => args.json,
-        Some(Command::Haptics(args)) => args.json,
-        Some(Command::Reliability(args)) => args.json,
-        Some(Command::Book(args)) => args.json,
+        Some(Command::Papers(papers)) => papers.is_json(),
         Some(Command::Certs(args)) => args.json,
         Some(Command::Doctor(args)) => args.json,
         Some(Command::Top(args)) => args.json,
@@ -79,11 +68,10 @@ pub fn main() -> ExitCode {
         Some(Command::Export(args)) => export::export(&args),
         Some(Command::Check(args)) => check::check(&args),
         Some(Command::Mesh(args)) => mesh::mesh(&args),
-        Some(Command::Accuracy(args)) => accuracy::accuracy(&args),
-        Some(Command::Stress(args)) => stress::stress(&args),
-        Some(Command::Haptics(args)) => haptics::haptics(&args),
-        Some(Command::Reliability(args)) => reliability::reliability(&args),
-        Some(Command::Book(args)) => book::book(&args),
+        Some(Command::Papers(Papers::Accuracy(args))) if accuracy::is_of_scenes(&args) => {
+            accuracy::accuracy(&args, &Scenes)
+        }
+        Some(Command::Papers(papers)) => Err(sibling::run("scindo-papers", papers.name())),
         Some(Command::Certs(args)) => certs::certs(&args),
         Some(Command::Router(args)) => router::route(&args),
         Some(Command::Doctor(args)) => doctor::doctor(&args),
@@ -91,18 +79,16 @@ pub fn main() -> ExitCode {
         Some(Command::Effects(args)) => effects::effects(&args),
         Some(Command::Manual(manual)) => describe(&manual),
     };
-    match outcome {
-        Ok(code) => code,
-        Err(error) => {
-            report(&error, json);
-            error.exit_code()
-        }
-    }
+    outcome.unwrap_or_else(|error| {
+        report(&error, error.code(), json);
+        error.exit_code()
+    })
 }
 
-fn report(error: &RuntimeError, json: bool) {
+/// Prints why a command failed: as JSON to the standard output, or in words to the standard error.
+pub fn report(error: &dyn std::error::Error, code: &str, json: bool) {
     if json {
-        let report = serde_json::json!({ "error": { "code": error.code(), "message": error.to_string() } });
+        let report = serde_json::json!({ "error": { "code": code, "message": error.to_string() } });
         println!("{report}");
     } else {
         eprintln!("error: {error}");

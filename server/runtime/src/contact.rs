@@ -185,7 +185,7 @@ fn open_line(config: &ContactConfig, tool: &str) -> Option<Line> {
 }
 
 /// The message of a model, computed for `input`.
-pub(crate) fn to_message(model: &LocalContact, input: &ToolInput, seq: u64) -> HapticContact {
+pub fn to_message(model: &LocalContact, input: &ToolInput, seq: u64) -> HapticContact {
     let mode = match model.mode {
         ContactMode::Free => haptic_contact::Mode::Free,
         ContactMode::Contact => haptic_contact::Mode::Contact,

@@ -5,8 +5,6 @@ use std::process::ExitCode;
 use scindo_client::LinkError;
 use scindo_proto::KeyError;
 use scindo_study::StudyError;
-use scindo_study::book::BookError;
-use scindo_study::stress::StressError;
 use scindo_study::study::effects::EffectsError;
 use scindo_world::format::MeshInError;
 use scindo_world::results::ResultsError;
@@ -31,15 +29,20 @@ pub enum RuntimeError {
     /// A study of accuracy failed.
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// A stress case does not exist, or its page cannot be written.
-    #[error(transparent)]
-    Stress(#[from] StressError),
     /// The effects of a scene cannot be measured.
     #[error(transparent)]
     Effects(#[from] EffectsError),
-    /// The pages of the book cannot be written.
-    #[error(transparent)]
-    Book(#[from] BookError),
+    /// The program that runs a command is not there.
+    #[error(
+        "`scindo {command}` is run by the program {program}, which is neither beside scindo nor on the PATH. Build it with \
+         `cargo build --release -p {program}`, or install the package, which holds both"
+    )]
+    NoSibling {
+        /// The program.
+        program: &'static str,
+        /// The command that it runs.
+        command: &'static str,
+    },
     /// An option of the command line cannot be used.
     #[error("{option} '{value}': {reason}. {next}")]
     Option {
@@ -151,9 +154,8 @@ impl RuntimeError {
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Study(StudyError::Io { .. }) => ExitCode::from(1),
-            Self::Stress(StressError::Io { .. }) => ExitCode::from(1),
             Self::Effects(EffectsError::Body(_)) => ExitCode::from(1),
-            Self::Study(_) | Self::Stress(_) | Self::Effects(_) => ExitCode::from(2),
+            Self::Study(_) | Self::Effects(_) => ExitCode::from(2),
             Self::Scene(_) | Self::Mesh(_) | Self::Option { .. } | Self::Key(_) | Self::Lab(_) => {
                 ExitCode::from(2)
             }
@@ -169,7 +171,6 @@ impl RuntimeError {
                 "scene"
             }
             Self::Study(_) => "study",
-            Self::Stress(_) => "stress",
             Self::Effects(_) => "effects",
             Self::Option { .. } => "option",
             Self::Key(_) => "key",
@@ -188,7 +189,7 @@ impl RuntimeError {
             Self::Export { .. } => "export",
             Self::System { .. } => "system",
             Self::Died { .. } => "died",
-            Self::Book(_) => "book",
+            Self::NoSibling { .. } => "no-sibling",
         }
     }
 }

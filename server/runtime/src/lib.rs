@@ -14,7 +14,6 @@
 //! * [`server`]: starts and ends all of these, and watches over them.
 //! * [`lab`]: laboratories with certificates, and what each role may do.
 //! * [`monitor`]: what people see of a machine and of a server.
-//! * [`experiment`]: what a hand feels over a link, and all of this in a simulated network with faults.
 //!
 //! | thread | does | waits for |
 //! |---|---|---|
@@ -40,4 +39,3 @@ pub mod rpc;
 pub mod record;
 pub mod server;
 pub mod monitor;
-pub mod experiment;

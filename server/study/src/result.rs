@@ -7,8 +7,8 @@ use crate::advice::sources::Sources;
 use crate::bench::store::Origin;
 use crate::case::Case;
 use crate::design::Configuration;
-use crate::experiment::ExperimentResult;
 use crate::reference::Reference;
+use crate::report::result::ExperimentResult;
 use crate::trial::Trial;
 use crate::trial::distance::Errors;
 

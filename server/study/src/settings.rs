@@ -9,8 +9,7 @@ use crate::design::axes::Factor;
 /// Cases to study, time limits, and factors to narrow.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Names of cases (see [`NAMES`](crate::case::NAMES)) and of [experiments](crate::experiment::NAMES), and paths of
-    /// scene files.
+    /// Paths of scene files, and names that a [library](crate::study::Library) knows.
     pub cases: Vec<String>,
     /// Directory of the results. Finished points in it are taken over.
     pub out: PathBuf,
@@ -27,7 +26,7 @@ pub struct Settings {
     pub only: Vec<(Factor, Vec<String>)>,
     /// Cells along the longest side, which replace the default meshes; empty for the defaults.
     pub cells: Vec<usize>,
-    /// Surface of a solid that takes the place of the built-in one in [experiments](crate::experiment).
+    /// Surface of a solid that takes the place of the built-in one in experiments.
     pub surface: Option<PathBuf>,
     /// Raised from elsewhere to end the study. Finished runs are kept and shown.
     pub stop: Arc<AtomicBool>,

@@ -1,25 +1,33 @@
 //! `scindo accuracy`: what accuracy costs in time, on reference cases or a scene.
 
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::atomic::AtomicBool;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use scindo_program::say;
 use scindo_study::design::axes::Factor;
-use scindo_study::experiment::ExperimentResult;
+use scindo_study::report::result::ExperimentResult;
 use scindo_study::words::percent;
-use scindo_study::{CaseResult, Settings, StudyResult};
+use scindo_study::{CaseResult, Library, Settings, StudyResult, run_with};
 use serde_json::json;
 
 use super::cli::AccuracyArgs;
-use super::say::say;
-use super::signals::Signals;
+use super::signals::listen;
 use super::study_progress::StudyProgress;
 use crate::error::RuntimeError;
 
+/// Whether only scene files are to be studied, which need no names. A name has no ending.
+pub fn is_of_scenes(args: &AccuracyArgs) -> bool {
+    let is_scene = |name: &String| Path::new(name).extension().is_some() && Path::new(name).is_file();
+    args.cases.iter().all(is_scene)
+}
+
 /// Runs the study. Ctrl-C ends it after the current step; finished runs are kept and shown.
-pub fn accuracy(args: &AccuracyArgs) -> Result<ExitCode, RuntimeError> {
+///
+/// # Errors
+/// An option, a name or a scene that cannot be used, or files that cannot be written.
+pub fn accuracy(args: &AccuracyArgs, library: &dyn Library) -> Result<ExitCode, RuntimeError> {
     check(args)?;
     let stop = Arc::new(AtomicBool::new(false));
     listen(&stop)?;
@@ -36,7 +44,7 @@ pub fn accuracy(args: &AccuracyArgs) -> Result<ExitCode, RuntimeError> {
         stop,
     };
     let progress = StudyProgress::begin();
-    let study = scindo_study::run(&settings, &mut |now| progress.show(now))?;
+    let study = run_with(library, &settings, &mut |now| progress.show(now))?;
     progress.end();
     drop(progress);
     if args.json {
@@ -74,37 +82,6 @@ fn narrowed(args: &AccuracyArgs) -> Vec<(Factor, Vec<String>)> {
         .filter(|(_, labels)| !labels.is_empty())
         .map(|(f, labels)| (f, labels.clone()))
         .collect()
-}
-
-/// Raises `stop` at the first Ctrl-C or request to terminate. A second Ctrl-C ends the program.
-pub(super) fn listen(stop: &Arc<AtomicBool>) -> Result<(), RuntimeError> {
-    let failed = |e: std::io::Error| RuntimeError::System {
-        what: "listening for signals".to_owned(),
-        reason: e.to_string(),
-    };
-    let stop = stop.clone();
-    let signals = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
-    let wait = move || {
-        signals.block_on(async {
-            let Ok(mut requests) = Signals::listen() else { return };
-            requests.either().await;
-            stop.store(true, Ordering::Relaxed);
-            requests.interrupt().await;
-            std::process::exit(130);
-        });
-    };
-    std::thread::Builder::new().name("signals".to_owned()).spawn(wait).map_err(failed)?;
-    Ok(())
-}
-
-/// A progress bar on the standard error; with `--json`, a hidden one.
-pub(super) fn bar(json: bool) -> ProgressBar {
-    let target = if json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {wide_msg}");
-    let bar = ProgressBar::with_draw_target(Some(0), target)
-        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.enable_steady_tick(Duration::from_millis(500));
-    bar
 }
 
 fn print(args: &AccuracyArgs, study: &StudyResult) {

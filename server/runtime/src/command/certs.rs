@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use scindo_program::say;
+
 use super::cli::CertsArgs;
-use super::say::say;
 use crate::error::RuntimeError;
 use crate::lab::folder::{Folder, LabError};
 use crate::lab::house::House;

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
+use scindo_program::say;
 use scindo_world::assemble::{BuildOptions, doubts};
 use scindo_world::forecast::{Effort, Forecast, forecast};
 use scindo_world::quantity::{coordinates, duration};
@@ -13,7 +14,6 @@ use serde_json::{Value, json};
 
 use super::cli::CheckArgs;
 use super::progress::Share;
-use super::say::say;
 use crate::error::RuntimeError;
 
 /// The forecast is abandoned when it takes longer than this multiple of its whole budget: one step hangs.

@@ -39,20 +39,11 @@ pub enum Command {
     Check(CheckArgs),
     /// Make a tetrahedral mesh from a surface or volume file.
     Mesh(MeshArgs),
-    /// Measure accuracy against time over laws, elements, meshes, steps and solvers, for reference cases or a
-    /// scene.
-    Accuracy(AccuracyArgs),
-    /// Run hard cases for deformation and cutting, and write a page of their results.
-    Stress(StressArgs),
-    /// Measure what a hand feels over a link, against the same tissue solved at 1 kHz, and write a page.
-    Haptics(HapticsArgs),
-    /// Try to break the promises of server and haptic client in a simulated network, and print the promises.
-    Reliability(ReliabilityArgs),
+    /// The commands of `scindo-papers`.
+    #[command(flatten)]
+    Papers(Papers),
     /// Measure what each effect of a scene costs by stepping the scene with it and without it.
     Effects(EffectsArgs),
-    /// Run all studies and write one site: every number that the papers print beside the one measured here, hard
-    /// cases, what a hand feels, what effects cost.
-    Book(BookArgs),
     /// Set up a laboratory with certificates, and admit clients to it.
     Certs(CertsArgs),
     /// Pass messages on between servers and clients: one door for several laboratories, or for many viewers.
@@ -64,6 +55,47 @@ pub enum Command {
     /// Completions and man pages.
     #[command(flatten)]
     Manual(Manual),
+}
+
+/// The commands that the program `scindo-papers` runs. Of `accuracy`, it runs what has a name.
+#[derive(Debug, Subcommand)]
+pub enum Papers {
+    /// Measure accuracy against time over laws, elements, meshes, steps and solvers, for reference cases or a
+    /// scene.
+    Accuracy(AccuracyArgs),
+    /// Run hard cases for deformation and cutting, and write a page of their results.
+    Stress(StressArgs),
+    /// Measure what a hand feels over a link, against the same tissue solved at 1 kHz, and write a page.
+    Haptics(HapticsArgs),
+    /// Try to break the promises of server and haptic client in a simulated network, and print the promises.
+    Reliability(ReliabilityArgs),
+    /// Run all studies and write one site: every number that the papers print beside the one measured here, hard
+    /// cases, what a hand feels, what effects cost.
+    Book(BookArgs),
+}
+
+impl Papers {
+    /// Whether the report is for programs.
+    pub fn is_json(&self) -> bool {
+        match self {
+            Self::Accuracy(args) => args.json,
+            Self::Stress(args) => args.json,
+            Self::Haptics(args) => args.json,
+            Self::Reliability(args) => args.json,
+            Self::Book(args) => args.json,
+        }
+    }
+
+    /// The name of the command.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Accuracy(_) => "accuracy",
+            Self::Stress(_) => "stress",
+            Self::Haptics(_) => "haptics",
+            Self::Reliability(_) => "reliability",
+            Self::Book(_) => "book",
+        }
+    }
 }
 
 /// `scindo run`.

@@ -4,10 +4,10 @@ use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
 
+use scindo_program::say;
 use scindo_proto::endpoint::bulk_endpoint;
 
 use super::cli::DoctorArgs;
-use super::say::say;
 use crate::error::RuntimeError;
 use crate::monitor::doctor::{Finding, State, listen, machine, papers};
 use crate::wire::session::{NetworkConfig, load};

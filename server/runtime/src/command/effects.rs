@@ -4,12 +4,13 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use scindo_program::say;
 use scindo_study::study::effects::{EffectsReport, Off, Request, Row, measure};
 use scindo_world::scene::Scene;
 
-use super::accuracy::{bar, listen};
 use super::cli::EffectsArgs;
-use super::say::say;
+use super::signals::listen;
+use super::study_progress::bar;
 use crate::error::RuntimeError;
 
 /// Measures the effects of the scene. Ctrl-C ends it after the current step and prints what is known.

@@ -6,13 +6,13 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
+use scindo_program::say;
 use scindo_world::results::{save_series, write_fields};
 use scindo_world::simulation::Simulation;
 use serde_json::json;
 
 use super::cli::ExportArgs;
 use super::progress::Progress;
-use super::say::say;
 use crate::error::RuntimeError;
 use crate::record::gltf::{Gltf, MAX_FRAMES};
 use crate::record::reader::{Recorded, Recording};

@@ -2,12 +2,12 @@
 
 use std::process::ExitCode;
 
+use scindo_program::say;
 use scindo_world::mesh_in::{load_any, write_mesh};
 use serde_json::json;
 
 use super::cli::MeshArgs;
 use super::progress::Share;
-use super::say::say;
 use crate::error::RuntimeError;
 
 /// Reads the file, repairs or fills the mesh, and writes it.

@@ -3,11 +3,11 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
+use scindo_program::say;
 use serde_json::json;
 
 use super::cli::ReplayArgs;
 use super::progress::Progress;
-use super::say::say;
 use crate::error::RuntimeError;
 use crate::record::replay::Replay;
 

@@ -2,8 +2,9 @@
 
 use std::process::ExitCode;
 
+use scindo_program::say;
+
 use super::cli::RouterArgs;
-use super::say::say;
 use super::signals::Signals;
 use crate::error::RuntimeError;
 use crate::wire::session::{NetworkConfig, router};

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use scindo_program::say;
 use scindo_proto::KeySpace;
 use scindo_proto::endpoint::bulk_endpoint;
 use scindo_view::{ViewConfig, Viewer};
@@ -19,7 +20,6 @@ use tokio::task::JoinHandle;
 
 use super::cli::{DemoArgs, RunArgs, ServeArgs};
 use super::progress::{Progress, Share};
-use super::say::say;
 use super::signals::Signals;
 use crate::error::RuntimeError;
 use crate::monitor::metrics::{self, Metrics};

@@ -1,5 +1,8 @@
 //! Requests to end this program from outside.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use crate::error::RuntimeError;
@@ -38,6 +41,30 @@ impl Signals {
     pub async fn interrupt(&mut self) {
         let _ = self.interrupt.recv().await;
     }
+}
+
+/// Raises `stop` at the first Ctrl-C or request to terminate. A second Ctrl-C ends the program.
+///
+/// # Errors
+/// The system does not let this program listen.
+pub fn listen(stop: &Arc<AtomicBool>) -> Result<(), RuntimeError> {
+    let failed = |e: std::io::Error| RuntimeError::System {
+        what: "listening for signals".to_owned(),
+        reason: e.to_string(),
+    };
+    let stop = stop.clone();
+    let signals = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+    let wait = move || {
+        signals.block_on(async {
+            let Ok(mut requests) = Signals::listen() else { return };
+            requests.either().await;
+            stop.store(true, Ordering::Relaxed);
+            requests.interrupt().await;
+            std::process::exit(130);
+        });
+    };
+    std::thread::Builder::new().name("signals".to_owned()).spawn(wait).map_err(failed)?;
+    Ok(())
 }
 
 #[cfg(test)]

@@ -17,6 +17,16 @@ const SELDOM: Duration = Duration::from_secs(2);
 /// Resolution of the bar when it shows time.
 const PARTS: u64 = 1000;
 
+/// A progress bar on the standard error; with `--json`, a hidden one.
+pub fn bar(json: bool) -> ProgressBar {
+    let target = if json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {wide_msg}");
+    let bar = ProgressBar::with_draw_target(Some(0), target)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.enable_steady_tick(Duration::from_millis(500));
+    bar
+}
+
 /// Shows the progress of a study on the standard error.
 pub struct StudyProgress {
     bar: ProgressBar,

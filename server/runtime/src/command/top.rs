@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use scindo_client::messages::Stats;
 use scindo_client::{Latest, Link, LinkConfig, LinkError, Role};
+use scindo_program::say;
 use tokio::time::timeout;
 
 use super::cli::TopArgs;
-use super::say::say;
 use crate::error::RuntimeError;
 use crate::monitor::top::{View, report, screen};
 

@@ -71,27 +71,3 @@ pub fn work(case: &Case, configuration: &Configuration) -> f64 {
     };
     finer.powi(4).max(1e-3) * element * integrator * law * steps
 }
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used)]
-mod tests {
-    use super::*;
-    use crate::case::builtin;
-    use crate::design::axes::step;
-
-    #[test]
-    fn a_run_of_the_same_kind_tells_most() {
-        let case = builtin("bar-motion", true).unwrap();
-        let base = Configuration::base(&case.axes);
-        let mut forecast = Forecast::default();
-        assert_eq!(forecast.seconds(&case, &base), None);
-        forecast.learn(&case, &base, 2.0);
-        let frame_s = base.setting(Factor::Step).unwrap().size;
-        let finer = base.with(Factor::Step, &step(0.25 * frame_s));
-        assert!((forecast.seconds(&case, &finer).unwrap() - 8.0).abs() < 1e-9);
-        let element = case.axes.iter().find(|a| a.factor == Factor::Element).unwrap();
-        let other = base.with(Factor::Element, element.settings.iter().find(|s| s.label == "tet10").unwrap());
-        forecast.learn(&case, &other, 100.0);
-        assert!((forecast.seconds(&case, &finer).unwrap() - 8.0).abs() < 1e-9);
-    }
-}

@@ -4,15 +4,7 @@ mod definition;
 
 mod ladder;
 
-mod builtin;
-
-mod cantilever;
-
-mod cut_beam;
-
-pub mod cutting;
-
-mod bar;
+mod probe;
 
 mod scene;
 
@@ -22,11 +14,8 @@ mod refine;
 
 mod subdivide;
 
-pub mod gold;
-
-mod shared;
-
-pub use builtin::{NAMES, builtin};
 pub use definition::{Case, Plan, Truth};
 pub use ladder::Ladder;
+pub use probe::{Point, probe_tables};
 pub use scene::{Wishes, from_scene};
+pub use vary::LAWS;

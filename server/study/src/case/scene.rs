@@ -6,8 +6,8 @@ use scindo_world::scene::{BodySpec, CheckedScene, Scene, SceneError, ToolSpec};
 use scindo_world::simulation::Simulation;
 
 use super::definition::{Case, Truth};
-use super::gold::{Point, probe_tables};
 use super::ladder::Ladder;
+use super::probe::{Point, probe_tables};
 use super::refine::{Split, aligned, levels, uneven};
 use super::subdivide::Subdivisions;
 use super::vary::{self, OWN, Subject};

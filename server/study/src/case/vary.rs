@@ -6,10 +6,12 @@ use scindo_world::scene::{BodySpec, CellSplit, CheckedScene, MeshSource};
 use serde_json::Value;
 
 use super::refine::{cells, levels};
-use super::shared::LAWS;
 use super::subdivide::Subdivisions;
 use crate::design::Block;
 use crate::design::axes::{Axis, Factor, Setting, on_bodies, step, threads, tolerance};
+
+/// All laws, as they are called in scenes.
+pub const LAWS: [&str; 4] = ["linear", "corotational", "stvk", "neo-hookean"];
 
 /// Label of a base that has no name of its own.
 pub const OWN: &str = "as in the scene";

@@ -2,12 +2,13 @@
 
 use std::fmt::Write as _;
 
-use super::html::{escape, prose, time};
-use super::plot::{Failure, Mark, Plot};
-use super::{style, wear};
+use super::wear;
 use crate::advice::sources::{Source, Sources};
 use crate::case::Case;
 use crate::design::axes::Factor;
+use crate::report::html::{escape, prose, time};
+use crate::report::plot::{Failure, Mark, Plot};
+use crate::report::style;
 use crate::result::{CaseResult, Outcome};
 use crate::trial::Protocol;
 use crate::trial::distance::Errors;

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::design::axes::Factor;
-use crate::experiment::ExperimentResult;
+use crate::report::result::ExperimentResult;
 use crate::result::{CaseResult, Outcome, StudyResult};
 
 /// Contents of `study.json`.

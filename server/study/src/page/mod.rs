@@ -1,21 +1,9 @@
 //! Output for people: a self-contained page and a plot per case. The same data is written as JSON and as a
 //! table.
 
-pub(crate) mod html;
-
 mod case;
 
-mod experiment;
-
-pub(crate) mod interactive;
-
 mod json;
-
-pub(crate) mod plot;
-
-pub(crate) mod scale;
-
-pub(crate) mod style;
 
 mod text;
 
@@ -27,6 +15,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::report::{interactive, section, style, view};
 use crate::result::StudyResult;
 
 /// Writes `index.html`, `study.json` and `pareto-<case>.svg`. Each file is written completely or not at all.
@@ -46,22 +35,6 @@ pub fn write(directory: &Path, study: &StudyResult) -> Result<(), (PathBuf, io::
     Ok(())
 }
 
-/// A self-contained page in the style of the others, with `body` as its content (HTML).
-pub fn wrap(title: &str, body: &str) -> String {
-    format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>scindo · {}</title>\n<style>\n{}{}{}{}{}</style>\n</head>\n<body>\n<main>\n{body}</main>\n{}</body>\n</html>\n",
-        html::escape(title),
-        style::PAGE,
-        style::COLOURS,
-        style::PLOT,
-        style::LINES,
-        interactive::STYLE,
-        interactive::SCRIPT
-    )
-}
-
 /// The complete page.
 fn html(study: &StudyResult) -> String {
     let mut out = String::with_capacity(1 << 18);
@@ -73,14 +46,14 @@ fn html(study: &StudyResult) -> String {
     out += style::PLOT;
     out += style::LINES;
     out += interactive::STYLE;
-    out += &crate::stress::view::style();
+    out += &view::style();
     out += "</style>\n</head>\n<body>\n<main>\n";
     out += &text::opening(study);
     for result in &study.cases {
         out += &case::section(result);
     }
     for result in &study.experiments {
-        out += &experiment::section(result);
+        out += &section::section(result);
     }
     out += &text::method(study);
     out += "</main>\n";

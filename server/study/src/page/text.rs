@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::html::{escape, time};
+use crate::report::html::{escape, time};
 use crate::result::{CaseResult, StudyResult};
 use crate::words::percent;
 

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::html::{escape, prose, time};
 use crate::design::axes::Factor;
+use crate::report::html::{escape, prose, time};
 use crate::result::{CaseResult, Outcome};
 use crate::trial::wear::{CUTS, Wear};
 use crate::words::percent;

@@ -17,8 +17,8 @@ use crate::bench::store::{Origin, Store};
 use crate::case::{self, Case, Wishes};
 use crate::design::axes::{Factor, block};
 use crate::design::narrow;
-use crate::experiment::{self, ExperimentBench};
 use crate::page::table::Table;
+use crate::report::result::ExperimentResult;
 use crate::result::StudyResult;
 use crate::settings::{SCENE_S, Settings};
 
@@ -29,10 +29,12 @@ pub enum StudyError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// A name is neither a case nor a file.
-    #[error("`{name}` is neither a scene file nor a case; cases: {}; groups of them: bar, cutting; experiments: {}; groups of them: dick, cells", case::NAMES.join(", "), experiment::NAMES.join(", "))]
+    #[error("`{name}` is neither a scene file nor a case; {known}")]
     UnknownCase {
         /// The name that was given.
         name: String,
+        /// What could be given instead.
+        known: String,
     },
     /// Narrowing leaves no setting.
     #[error("`{label}` is not a setting of {factor} in case {case}; settings: {known}")]
@@ -56,7 +58,45 @@ pub enum StudyError {
     },
 }
 
-/// Runs a study and writes `points.csv`, `study.json`, a plot per case and `index.html`.
+/// What names stand for, beside scene files.
+pub trait Library {
+    /// The cases of a name or group; none if it stands for none.
+    fn cases(&self, name: &str, quick: bool) -> Vec<Case>;
+    /// The experiments of a name or group; none if it stands for none.
+    fn experiments(&self, name: &str) -> &'static [&'static str];
+    /// Makes an experiment.
+    fn make(
+        &self,
+        experiment: &'static str,
+        settings: &Settings,
+        tell: &mut dyn FnMut(&Progress),
+    ) -> ExperimentResult;
+    /// All names, for the message that refuses another one.
+    fn names(&self) -> String;
+}
+
+/// No names: only scene files are studied.
+pub struct Scenes;
+
+impl Library for Scenes {
+    fn cases(&self, _: &str, _: bool) -> Vec<Case> {
+        Vec::new()
+    }
+
+    fn experiments(&self, _: &str) -> &'static [&'static str] {
+        &[]
+    }
+
+    fn make(&self, name: &'static str, _: &Settings, _: &mut dyn FnMut(&Progress)) -> ExperimentResult {
+        ExperimentResult { name, ..ExperimentResult::default() }
+    }
+
+    fn names(&self) -> String {
+        "give the path of a scene file".to_owned()
+    }
+}
+
+/// Runs a study of scene files and writes `points.csv`, `study.json`, a plot per case and `index.html`.
 ///
 /// # Errors
 /// Bad names, bad scenes, or files that cannot be written. Failed runs are results.
@@ -103,12 +143,24 @@ pub enum StudyError {
 /// # }
 /// ```
 pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<StudyResult, StudyError> {
-    let cases = open(settings)?;
+    run_with(&Scenes, settings, tell)
+}
+
+/// As [`run`], with names that stand for the cases and experiments of a library.
+///
+/// # Errors
+/// Those of [`run`].
+pub fn run_with(
+    library: &dyn Library,
+    settings: &Settings,
+    tell: &mut dyn FnMut(&Progress),
+) -> Result<StudyResult, StudyError> {
+    let cases = open(library, settings)?;
     let origin = Origin::here();
     let io = |(path, source)| StudyError::Io { path, source };
     let store = Store::open(&settings.out, &origin).map_err(io)?;
     Table::begin(&settings.out).map_err(io)?;
-    let wanted = experiments(settings);
+    let wanted = settings.cases.iter().flat_map(|name| library.experiments(name)).copied();
     let started = Instant::now();
     let mut bench = Bench::new(settings, store, &mut *tell);
     let resumed = bench.store.resumed;
@@ -144,9 +196,7 @@ pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<Study
             result.interrupted = true;
             break;
         }
-        result
-            .experiments
-            .push(experiment::study(name, &mut ExperimentBench::new(name, settings, &mut *tell)));
+        result.experiments.push(library.make(name, settings, &mut *tell));
         result.seconds = started.elapsed().as_secs_f64();
         result.load[1] = load();
         result.interrupted = settings.stop.load(Ordering::Relaxed);
@@ -165,24 +215,18 @@ fn share(settings: &Settings, case: &Case, waiting: usize, elapsed_s: f64) -> f6
 }
 
 /// Opens the requested cases and narrows them.
-fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
+fn open(library: &dyn Library, settings: &Settings) -> Result<Vec<Case>, StudyError> {
     let mut cases = Vec::new();
     let threads = threads(settings);
-    for name in settings.cases.iter().filter(|name| experiment(name).is_empty()) {
-        let several: &[&str] = match name.as_str() {
-            "bar" => &["bar-rest", "bar-motion"],
-            "cutting" => &["cut-tc1", "cut-tc2force", "cut-tc2strip"],
-            _ => &[],
-        };
-        if !several.is_empty() {
-            cases.extend(several.iter().filter_map(|name| case::builtin(name, settings.quick)));
-        } else if let Some(case) = case::builtin(name, settings.quick) {
-            cases.push(case);
+    for name in settings.cases.iter().filter(|name| library.experiments(name).is_empty()) {
+        let known = library.cases(name, settings.quick);
+        if !known.is_empty() {
+            cases.extend(known);
         } else if Path::new(name).exists() {
             let scene = Scene::load(Path::new(name))?;
             cases.push(case::from_scene(&scene, wishes(settings, &threads))?);
         } else {
-            return Err(StudyError::UnknownCase { name: name.clone() });
+            return Err(StudyError::UnknownCase { name: name.clone(), known: library.names() });
         }
     }
     for case in &mut cases {
@@ -193,20 +237,6 @@ fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
         }
     }
     Ok(cases)
-}
-
-/// The experiments that a name stands for: one, a group, or none if it is a case or a scene.
-fn experiment(name: &str) -> &'static [&'static str] {
-    match experiment::NAMES.iter().position(|known| *known == name) {
-        Some(i) => &experiment::NAMES[i..=i],
-        None if name == "cells" => &experiment::NAMES[..experiment::CELLS],
-        None if name == "dick" => &experiment::NAMES[..experiment::PAPERS],
-        None => &[],
-    }
-}
-
-fn experiments(settings: &Settings) -> Vec<&'static str> {
-    settings.cases.iter().flat_map(|name| experiment(name)).copied().collect()
 }
 
 /// The user's choices that concern scenes.

@@ -2,7 +2,7 @@
 
 pub mod distance;
 
-pub(crate) mod random;
+pub mod random;
 
 pub mod series;
 
