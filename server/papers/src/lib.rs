@@ -5,6 +5,7 @@
 //!
 //! * [`lab`] and [`system`]: what experiments share, and linear systems of octree cells taken apart.
 //! * [`cases`]: accuracy cases with known solutions, run by `scindo-study`.
+//! * [`enrichment`]: the bases of enriched finite elements, compared on cut elements and bodies.
 //! * [`experiment`]: measurements of parts of the program, many of them beside the figures of a paper.
 //! * [`stress`]: hard cases, which break codes that deform and cut.
 //! * [`haptics`]: what a hand feels over a link, against the same tissue solved at 1 kHz.
@@ -18,6 +19,9 @@ pub mod lab;
 pub mod system;
 
 pub mod cases;
+
+#[allow(non_snake_case)]
+pub mod enrichment;
 
 #[allow(non_snake_case)]
 pub mod experiment;

@@ -44,7 +44,8 @@ fn a_missing_sibling_is_named_with_what_to_do() {
 
 #[test]
 fn arguments_signals_and_the_exit_code_pass() {
-    let run = scindo(Some("echo \"$#\" \"$@\"; exit 7"), &["accuracy", "r1", "--out", "two words", "--quick"]);
+    let run =
+        scindo(Some("echo \"$#\" \"$@\"; exit 7"), &["accuracy", "r1", "--out", "two words", "--quick"]);
     assert_eq!(String::from_utf8(run.stdout).unwrap(), "5 accuracy r1 --out two words --quick\n");
     assert_eq!(run.status.code(), Some(7));
 

@@ -1,4 +1,5 @@
-//! What an enriched element costs, by law: forces and their Jacobian apart, and whole steps.
+//! What an enriched element costs, by law: forces and their Jacobian apart, and whole steps. Then the enrichments of the
+//! literature beside each other: displacement, conditioning, cost, critical time step.
 //!
 //! # Source
 //! Jeřábková 2007, section 3.3: operations of an enriched element over those of a plain one.
@@ -7,13 +8,14 @@ use nalgebra::Vector3;
 use scindo_physics::assembly::Model;
 use scindo_physics::body::{Body, BodySettings, Outcome, PcgSettings, Scheme};
 use scindo_physics::cut::BladeSweep;
-use scindo_physics::cut::enrichment::{EnrichedTet, Enrichment, Side, UA};
 use scindo_physics::material::{Law, Material, Rayleigh, Tangent};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 use scindo_study::report::result::{ExperimentResult, Table, Unit};
 
-use crate::lab::least;
-use crate::lab::{ExperimentBench, LAWS, Trouble, hold_left};
+use crate::enrichment::basis::{Enrichment, Side};
+use crate::enrichment::enriched_tet::{EnrichedTet, UA};
+use crate::enrichment::{bases, steps};
+use crate::lab::{ExperimentBench, LAWS, Trouble, hold_left, least};
 
 type V = Vector3<f64>;
 
@@ -78,8 +80,9 @@ pub fn enriched(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Tro
             ("of step", Unit::Times),
         ],
     );
+    let total = LAWS.len() + bases::BASES.len() * bases::SLIVERS.len() + 1;
     for (law, name) in LAWS {
-        bench.begin(format!("{name} law"), LAWS.len())?;
+        bench.begin(format!("{name} law"), total)?;
         let plain = block(law, cells, false)?;
         let cut = block(law, cells, true)?;
         let (n, share) = (plain.n_elements() as f64, share_cut(&plain, &cut)?);
@@ -97,7 +100,11 @@ pub fn enriched(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Tro
             table.printed(format!("{name}, printed"), &values);
         }
     }
-    result.tables.extend([table, coefficients()?]);
+    let in_bases = bases::compared(bench, total)?;
+    bench.begin("critical steps", total)?;
+    let (curves, steps) = steps::critical_steps()?;
+    result.tables.extend([table, coefficients()?, in_bases, steps]);
+    result.plots.push(curves);
     Ok(result)
 }
 

@@ -16,6 +16,7 @@ use scindo_physics::solver::multigrid::{
     CellMaterial, Coefficients, Hierarchy, Multigrid, MultigridSettings, Smoother,
 };
 use scindo_physics::team::{Team, blocks};
+use scindo_study::words::compact;
 
 use super::model::{Held, Pull};
 use crate::lab::Trouble;
@@ -97,7 +98,7 @@ impl Problem {
     /// Name in tables.
     pub fn words(self) -> String {
         match self {
-            Self::Step(s) => format!("s = {}", crate::stress::evidence::short(s)),
+            Self::Step(s) => format!("s = {}", compact(s)),
             Self::Equilibrium => "no mass".to_owned(),
         }
     }

@@ -30,7 +30,6 @@ pub(crate) mod drawn;
 pub(crate) mod shell;
 mod sweep;
 mod cut_mesh;
-pub mod enrichment;
 pub mod remesh;
 pub(crate) mod middles;
 mod incision_mark;

@@ -5,12 +5,10 @@
 
 mod beam_case;
 mod bodies;
-mod critical_step;
 mod cut_through_elements;
 mod degenerate_elements;
 mod drooping_bar;
 mod eigenfrequencies;
-mod enriched_bodies;
 mod estimates;
 mod explicit;
 mod fibres;

@@ -1,8 +1,10 @@
 //! The critical time step of a cut element: the curves of Jeřábková's thesis, Figs. 3.10 to 3.12.
 
-use scindo_physics::cut::enrichment::{CutElement, Enrichment, Lumping};
 use scindo_study::report::chart::{Chart, Line};
 
+use crate::enrichment::basis::Enrichment;
+use crate::enrichment::cut_element::CutElement;
+use crate::enrichment::lumping::Lumping;
 use crate::lab::Trouble;
 use crate::stress::case::{Case, Setting};
 use crate::stress::evidence::Evidence;

@@ -1,19 +1,22 @@
 //! One cut body in all bases: the same displacements, different conditioning.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use scindo_physics::assembly::{BlockCsr, Model, Tangent, Volumetric};
-use scindo_physics::cut::enrichment::{EnrichedTet, EnrichedView, Enrichment, Side, UA, thesis_claims};
 use scindo_physics::cut::{BladeSweep, CutMesh};
 use scindo_physics::element::FixedCopy;
 use scindo_physics::integrator::StaticProblem;
 use scindo_physics::material::Law;
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 use scindo_physics::solver::{
-    Curvature, LinearSettings, LinearSolver, Method, Newton, NewtonSettings, Potential, Precision, StopReason,
+    Curvature, LinearSettings, Method, Newton, NewtonSettings, Potential, Precision, StopReason,
 };
 use scindo_physics::team::Team;
 
-use crate::support::{clamped, material};
+use super::{clamped, material};
+use crate::enrichment::bases::{System, condition_numbers};
+use crate::enrichment::basis::{Enrichment, Side};
+use crate::enrichment::enriched_tet::{EnrichedTet, UA};
+use crate::enrichment::view::EnrichedView;
 
 type V = Vector3<f64>;
 const LAWS: [Law; 3] = [Law::Linear, Law::Corotational, Law::StVenantKirchhoff];
@@ -259,61 +262,6 @@ fn masses_of_copies_are_two_by_two_blocks() {
     assert!(checked > 10, "{checked}");
 }
 
-/// Smallest and largest eigenvalue of the free part of A, as it is and with its 3×3 diagonal blocks made
-/// the identity: their quotients.
-fn condition_numbers(A: &BlockCsr<f64>, fixed: &[FixedCopy]) -> [f64; 2] {
-    let free: Vec<usize> = (0..A.n_rows()).filter(|&i| fixed.iter().all(|f| f.copy as usize != i)).collect();
-    let n = free.len();
-    let root = |i: usize| -> Matrix3<f64> {
-        let eigen = A.diagonal(i).symmetric_eigen();
-        let scale = Matrix3::from_diagonal(&eigen.eigenvalues.map(|l| 1.0 / l.sqrt()));
-        eigen.eigenvectors * scale * eigen.eigenvectors.transpose()
-    };
-    let roots: Vec<Matrix3<f64>> = free.iter().map(|&i| root(i)).collect();
-    let (mut plain, mut scaled) = (DMatrix::zeros(3 * n, 3 * n), DMatrix::zeros(3 * n, 3 * n));
-    for (i, &r) in free.iter().enumerate() {
-        for (j, &c) in free.iter().enumerate() {
-            let block = A.block(r, c as u32);
-            plain.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&block);
-            scaled.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&(roots[i] * block * roots[j]));
-        }
-    }
-    [plain, scaled].map(|A| {
-        let values = A.symmetric_eigenvalues();
-        values.max() / values.min()
-    })
-}
-
-/// A cube held at top and bottom and cut through v^⅓ cells above a layer of nodes.
-fn sliced_cube(cells: usize, fraction: f64) -> CutMesh {
-    let mut cut = CutMesh::new(box_mesh(V::zeros(), V::repeat(0.1), [cells; 3], BoxPattern::Tet6)).unwrap();
-    let z = 0.1 / cells as f64 * ((cells / 2) as f64 + fraction.cbrt());
-    let blade = |x: f64| [V::new(x, -0.1, z), V::new(x, 0.2, z)];
-    sweep(&mut cut, 1, [blade(-0.1), blade(0.2)]);
-    cut
-}
-
-fn stiffness(cut: &CutMesh) -> (Model, BlockCsr<f64>, Vec<FixedCopy>) {
-    let model = Model::tet4_cut(cut, &material(1e5, 0.3, DENSITY, Law::Linear), Volumetric::Full).unwrap();
-    let mut K = model.pattern();
-    model.tangent(model.rest(), Tangent::Exact, &mut K);
-    let mut fixed = clamped(&model, |X| X.z < 1e-9);
-    fixed.extend(clamped(&model, |X| X.z > 0.1 - 1e-9));
-    (model, K, fixed)
-}
-
-/// Iterations of conjugate gradients alone and with block-Jacobi until the residual fell to 1e-6.
-fn iterations(A: &BlockCsr<f64>, b: &[V], fixed: &[FixedCopy]) -> [u32; 2] {
-    [Method::Cg, Method::Pcg].map(|method| {
-        let settings =
-            LinearSettings { method, precision: Precision::Double, iterations: 100_000, tolerance: 1e-6 };
-        let mut solver = LinearSolver::new(settings);
-        solver.set_matrix(A, fixed);
-        let mut x = vec![V::zeros(); b.len()];
-        solver.solve(&mut Team::new(1).unwrap(), A, b, &mut x, None).iterations
-    })
-}
-
 /// On copies block-Jacobi leaves nothing of the slivers. The shifted enrichment costs about twice the
 /// iterations; in that by H the two functions of a node become the same one with the sliver, which no
 /// diagonal scaling can mend. Without preconditioner all suffer.
@@ -323,15 +271,10 @@ fn conditioning_differs_between_the_bases() {
     let mut scaled = Vec::new();
     for fraction in [1e-1, 1e-3, 1e-6, 1e-9] {
         let row = bases.map(|enrichment| {
-            let cut = sliced_cube(4, fraction);
-            let (_, K, fixed) = stiffness(&cut);
-            let view = EnrichedView::new(&cut, enrichment);
-            let [plain, scaled] = condition_numbers(&view.matrix(&K), &view.fixed(&fixed).unwrap());
-            let cut = sliced_cube(6, fraction);
-            let (model, K, fixed) = stiffness(&cut);
-            let (view, mut b) = (EnrichedView::new(&cut, enrichment), load(&model));
-            view.forces(&mut b);
-            let [cg, pcg] = iterations(&view.matrix(&K), &b, &view.fixed(&fixed).unwrap());
+            let small = System::new(4, fraction, enrichment).unwrap();
+            let [plain, scaled] = condition_numbers(&small.K, &small.fixed);
+            let system = System::new(6, fraction, enrichment).unwrap();
+            let [cg, pcg] = [Method::Cg, Method::Pcg].map(|method| system.solve(method).unwrap().1);
             println!(
                 "{enrichment:?}, slivers of {fraction:e}: condition {plain:.1e}, with block-Jacobi {scaled:.1e}; \
                  iterations {cg} and {pcg}"
@@ -347,16 +290,4 @@ fn conditioning_differs_between_the_bases() {
         assert!(row[shifted].1 > row[copies].1);
     }
     assert!(last[heaviside].0 > 1e5 * last[copies].0);
-}
-
-/// The words of [`thesis_claims`], for the record.
-#[test]
-fn claims_about_the_critical_time_step() {
-    for claim in thesis_claims().unwrap() {
-        let verdict = if claim.holds { "holds" } else { "does not hold" };
-        println!(
-            "{} {verdict}: “{}”. Found: {}. Instead: {}",
-            claim.place, claim.printed, claim.found, claim.instead
-        );
-    }
 }

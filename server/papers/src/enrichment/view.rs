@@ -1,11 +1,11 @@
 //! A whole cut body in the degrees of freedom of an enrichment: a linear change of variables from its copies.
 
 use nalgebra::{DMatrix, Vector3};
+use scindo_physics::assembly::BlockCsr;
+use scindo_physics::cut::CutMesh;
+use scindo_physics::element::{FixedCopy, Held};
 
-use super::{Enrichment, Side};
-use crate::assembly::BlockCsr;
-use crate::cut::CutMesh;
-use crate::element::{FixedCopy, Held};
+use super::basis::{Enrichment, Side};
 
 /// The linear map q = C p between the positions q of the copies of a body and the degrees of freedom
 /// p = [X + u; a] of an enrichment.

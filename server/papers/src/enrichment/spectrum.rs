@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::EnrichmentError;
+use super::error::EnrichmentError;
 
 /// A pivot of the scaled mass matrix below this is round-off.
 const SMALLEST_PIVOT: f64 = 1e-13;

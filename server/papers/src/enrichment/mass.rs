@@ -2,7 +2,10 @@
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
-use super::{CutElement, Enrichment, EnrichmentError, Lumping, Side};
+use super::basis::{Enrichment, Side};
+use super::cut_element::CutElement;
+use super::error::EnrichmentError;
+use super::lumping::Lumping;
 
 impl CutElement {
     /// Scalar mass matrix M [kg], 2n × 2n, in the order [u_0 … u_n−1, a_0 … a_n−1]; the same for
@@ -21,13 +24,11 @@ impl CutElement {
         let mut lumped = DMatrix::zeros(2 * n, 2 * n);
         let standard_scale = self.mass_kg() / block(0).trace();
         for b in 0..2 {
-            let scale = match (enrichment, lumping) {
-                (Enrichment::Substitution, _) | (_, Lumping::HrzBlockMass) if b == 1 => {
-                    block(b).sum() / block(b).trace()
-                }
-                (Enrichment::Substitution, _) => block(b).sum() / block(b).trace(),
-                _ => standard_scale,
+            let keeps_its_mass = match enrichment {
+                Enrichment::Substitution => true,
+                _ => lumping == Lumping::HrzBlockMass && b == 1,
             };
+            let scale = if keeps_its_mass { block(b).sum() / block(b).trace() } else { standard_scale };
             // The m of the printed formula. For substitution it is the mass of the piece.
             let m = if enrichment == Enrichment::Substitution { block(b).sum() } else { self.mass_kg() };
             for i in 0..n {

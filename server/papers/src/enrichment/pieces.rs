@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, Matrix4, Vector4};
 
-use super::{EnrichmentError, Side};
+use super::basis::Side;
+use super::error::EnrichmentError;
 
 /// Volume fraction and moments of one side of a cut element.
 #[derive(Clone, Debug, PartialEq)]

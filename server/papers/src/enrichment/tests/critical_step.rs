@@ -1,10 +1,13 @@
 //! R5: critical time step of cut elements in four bases and five lumpings.
 
 use nalgebra::Vector3;
-use scindo_physics::cut::enrichment::{CutElement, Enrichment, Lumping};
 use scindo_physics::material::{Law, Material, Rayleigh};
 
-const REFERENCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../reference/R5/");
+use crate::enrichment::basis::Enrichment;
+use crate::enrichment::cut_element::CutElement;
+use crate::enrichment::lumping::Lumping;
+
+const REFERENCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/R5/");
 
 fn rows(file: &str) -> Vec<Vec<String>> {
     let mut reader = csv::Reader::from_path(format!("{REFERENCE}{file}")).unwrap();

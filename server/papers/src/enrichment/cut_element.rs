@@ -1,11 +1,14 @@
 //! One element cut in two: its stiffness in every basis, and its critical time step.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use scindo_physics::material::Lame;
+use scindo_physics::mesh::{tet_gradients, tet_volume};
 
+use super::basis::{Enrichment, Side};
+use super::error::EnrichmentError;
+use super::lumping::Lumping;
+use super::pieces::{Piece, bar_pieces, tet_pieces};
 use super::spectrum::largest_frequency;
-use super::{Enrichment, EnrichmentError, Lumping, Piece, Side, bar_pieces, tet_pieces};
-use crate::material::Lame;
-use crate::mesh::{tet_gradients, tet_volume};
 
 /// A bar or a linear tet cut in two, in its rest configuration and for small strains.
 #[derive(Clone, Debug)]

@@ -1,10 +1,12 @@
 //! Forces and tangent of a linear tet cut in two, in blocks of u and a as in the papers.
 
 use nalgebra::{Matrix3, Vector3};
+use scindo_physics::material::{Lame, Law, SignedSvd, Tangent};
+use scindo_physics::mesh::{tet_gradients, tet_volume};
 
-use super::{Enrichment, EnrichmentError, Side, tet_stiffness};
-use crate::material::{Lame, Law, SignedSvd, Tangent};
-use crate::mesh::{tet_gradients, tet_volume};
+use super::basis::{Enrichment, Side};
+use super::cut_element::tet_stiffness;
+use super::error::EnrichmentError;
 
 /// One vector per node for the standard and for the added degrees of freedom.
 #[derive(Clone, Copy, Debug, PartialEq)]
