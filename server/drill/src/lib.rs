@@ -2,7 +2,7 @@
 //! that loses, repeats, delays, reorders and spoils messages, and with partners that freeze, vanish and lie.
 //!
 //! # What is real
-//! Messages are encoded to bytes and decoded by the functions that zenoh's threads call ([`scindo::wire::receive`]); inbox,
+//! Messages are encoded to bytes and decoded by the functions that zenoh's threads call ([`scindo::receive`]); inbox,
 //! simulation, contact models and the haptic tick are those of the programs. Simulated are sockets, threads and time: a
 //! seed decides everything, so that a failure can be repeated.
 //!

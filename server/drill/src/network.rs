@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use bytes::Bytes;
-use scindo::wire::receive::Arrival;
+use scindo::receive::Arrival;
 use serde::Serialize;
 
 use crate::chance::Chance;

@@ -9,7 +9,7 @@ use crossbeam_channel::{Receiver, bounded};
 use scindo::contact::to_message;
 use scindo::exchange::{ANSWERS, Exchange, OUTGOING};
 use scindo::inbox::{Answering, Inbox};
-use scindo::wire::receive;
+use scindo::receive;
 use scindo_proto::messages::{CutAck, CutCommand, HapticContact, ToolSample};
 use scindo_proto::{Chunk, KeySpace, Role, Topic, decode_as, encode, encoding};
 use scindo_world::contact::model::{ContactModels, ToolQuery};

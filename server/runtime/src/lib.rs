@@ -1,19 +1,24 @@
 //! The scindo server.
 //!
-//! # Layout, along the way of the data
-//! * [`command`]: the commands and their outcome.
+//! # Layout
+//! Each module knows only those before it:
+//! * [`error`]: failures and their exit codes.
+//! * [`lab`]: laboratories with certificates, and what each role may do.
+//! * [`monitor`]: what people see of a machine and of a server.
 //! * [`wire`]: the two zenoh sessions (haptic and bulk), who may give orders through them, the
 //!   [pace](wire::door) of clients before zenoh hears them, and conversion between messages and the types of the world.
-//! * [`wire::receive`] → [`inbox`]: poses and cuts of clients; who holds which tool.
+//! * [`inbox`]: poses and cuts of clients; who holds which tool.
 //! * [`exchange`]: state shared by the threads.
+//! * [`receive`]: what arrives, from the wire into the inbox.
+//! * [`record`]: recordings of all of this, and their replay.
 //! * [`sim`]: the simulation thread.
 //! * [`contact`]: the contact thread, 200 Hz or more beside the simulation.
 //! * [`publish`]: the publication thread, and the threads that answer late joiners.
 //! * [`rpc`]: questions and orders.
-//! * [`record`]: recordings of all of this, and their replay.
 //! * [`server`]: starts and ends all of these, and watches over them.
-//! * [`lab`]: laboratories with certificates, and what each role may do.
-//! * [`monitor`]: what people see of a machine and of a server.
+//! * [`command`]: the commands and their outcome.
+//!
+//! The way of the data is wire, receive, inbox, sim, exchange, publish, wire.
 //!
 //! | thread | does | waits for |
 //! |---|---|---|
@@ -26,16 +31,17 @@
 //! | `watchdog` | breaks off steps that keep orders waiting; ends a process that does not end | its period |
 //! | zenoh's own | decode, check, store in the inbox | nothing |
 
-pub mod command;
 pub mod error;
+pub mod lab;
+pub mod monitor;
 pub mod wire;
 pub mod inbox;
-pub mod lab;
 pub mod exchange;
+pub mod receive;
+pub mod record;
 pub mod sim;
 pub mod contact;
 pub mod publish;
 pub mod rpc;
-pub mod record;
 pub mod server;
-pub mod monitor;
+pub mod command;

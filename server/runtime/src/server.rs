@@ -26,7 +26,7 @@ use crate::rpc::{self, RpcThread};
 use crate::sim::engine::Engine;
 use crate::sim::{Command, Pace, SimThread};
 use crate::wire::convert::ProbeName;
-use crate::wire::receive::Receivers;
+use crate::receive::Receivers;
 use crate::wire::session::Sessions;
 
 /// Most orders that may wait for the simulation thread.

@@ -1,10 +1,8 @@
-//! The network: sessions, permissions for orders, the door before them, what arrives, and conversion of messages.
+//! The network: sessions, permissions for orders, the door before them, and conversion of messages.
 
 pub mod session;
 
 pub mod door;
-
-pub mod receive;
 
 pub mod orders;
 

@@ -10,7 +10,7 @@ use bytes::Bytes;
 use prost::Message as _;
 use scindo::exchange::Exchange;
 use scindo::inbox::Inbox;
-use scindo::wire::receive::{Arrival, capability, cut, pose, token};
+use scindo::receive::{Arrival, capability, cut, pose, token};
 use scindo_fuzz::attack;
 use scindo_haptic::device::haply::service::Update;
 use scindo_igtl::wire::content::Content;
