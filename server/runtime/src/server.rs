@@ -21,12 +21,12 @@ use crate::exchange::{ANSWERS, Exchange, OUTGOING};
 use crate::inbox::Inbox;
 use crate::monitor::metrics::Metrics;
 use crate::publish::{PublishThread, Published, Sources};
+use crate::receive::Receivers;
 use crate::rpc::catalogue::Catalogue;
 use crate::rpc::{self, RpcThread};
 use crate::sim::engine::Engine;
 use crate::sim::{Command, Pace, SimThread};
 use crate::wire::convert::ProbeName;
-use crate::receive::Receivers;
 use crate::wire::session::Sessions;
 
 /// Most orders that may wait for the simulation thread.
