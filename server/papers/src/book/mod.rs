@@ -14,11 +14,11 @@ pub mod part;
 
 mod page;
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use scindo_study::bench::store::Origin;
+use scindo_study::report::frame::put;
 use serde_json::{Value, json};
 use thiserror::Error;
 
@@ -72,19 +72,7 @@ pub fn write(
 ) -> Result<Vec<Tally>, BookError> {
     let papers = papers()?;
     let measured = Measured::read(directory, parts);
-    let put = |name: &str, text: &str| {
-        let (path, draft) = (directory.join(name), directory.join(format!("{name}.part")));
-        let written = fs::create_dir_all(directory)
-            .and_then(|()| fs::write(&draft, text))
-            .and_then(|()| fs::rename(&draft, &path));
-        written.map_err(|source| BookError::Io { path, source })
-    };
     let tallies: Vec<Tally> = papers.iter().map(|paper| tally(paper, &measured, quick)).collect();
-    for paper in &papers {
-        put(&page::name(paper), &page::paper(paper, &measured, origin, quick))?;
-    }
-    put("effects.html", &page::effects(&measured))?;
-    put("index.html", &page::index(&papers, &tallies, parts, &measured, (origin, quick)))?;
     let rows = papers.iter().map(|paper| rows(paper, &measured, quick));
     let book = json!({
         "origin": origin,
@@ -92,7 +80,14 @@ pub fn write(
         "papers": rows.collect::<Vec<_>>(),
         "tallies": tallies.iter().map(Tally::to_json).collect::<Vec<_>>(),
     });
-    put("book.json", &format!("{book:#}\n"))?;
+    let of_papers =
+        papers.iter().map(|paper| (page::name(paper), page::paper(paper, &measured, origin, quick)));
+    let of_all = [
+        ("effects.html".to_owned(), page::effects(&measured)),
+        ("index.html".to_owned(), page::index(&papers, &tallies, parts, &measured, (origin, quick))),
+        ("book.json".to_owned(), format!("{book:#}\n")),
+    ];
+    put(directory, of_papers.chain(of_all)).map_err(|(path, source)| BookError::Io { path, source })?;
     Ok(tallies)
 }
 

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use scindo_study::bench::store::Origin;
+use scindo_study::report::frame;
 use scindo_study::report::html::{escape, prose, time};
 use scindo_study::report::result::Unit;
-use scindo_study::report::wrap;
 use scindo_study::words::compact;
 use scindo_world::results::Machine;
 use serde_json::Value;
@@ -22,7 +22,7 @@ pub fn name(paper: &Paper) -> String {
 }
 
 /// Colours of the verdicts.
-const STYLE: &str = "<style>
+const STYLE: &str = "
 .verdict { font-weight: 600; }
 .v0 { color: var(--c2); } .v1 { color: var(--c0); } .v2 { color: var(--c3); } .v3 { color: var(--soft); } .v4 { color: var(--bad); } .v5 { color: var(--soft); font-weight: 400; }
 .filter label { margin-right: 14px; white-space: nowrap; }
@@ -34,7 +34,6 @@ td.why { white-space: normal; min-width: 30ch; color: var(--soft); }
 .tally i { display: block; height: 100%; }
 .b0 { background: var(--c2); } .b1 { background: var(--c0); } .b2 { background: var(--c3); } .b3 { background: var(--s4); } .b4 { background: var(--bad); } .b5 { background: transparent; }
 @media print { .filter { display: none; } a { color: inherit; text-decoration: none; } }
-</style>
 ";
 
 /// Hides rows of verdicts that are switched off.
@@ -63,7 +62,7 @@ fn plain(value: &Value) -> String {
 /// The page of a paper: a row per printed number.
 pub fn paper(paper: &Paper, measured: &Measured, origin: &Origin, quick: bool) -> String {
     let mut out = format!(
-        "{STYLE}<p><a href=\"index.html\">The book</a></p>\n<header><h1>{}</h1>\n<p class=\"lead\">{}, {}</p></header>\n\
+        "<p><a href=\"index.html\">The book</a></p>\n<header><h1>{}</h1>\n<p class=\"lead\">{}, {}</p></header>\n\
          <p>{}</p>\n<p class=\"note\">Printed: {}. Here: {}.",
         escape(&paper.title),
         escape(&paper.authors),
@@ -102,7 +101,7 @@ pub fn paper(paper: &Paper, measured: &Measured, origin: &Origin, quick: bool) -
     }
     out += "</tbody></table></div>\n";
     out += FILTER;
-    wrap(&paper.title, &out)
+    frame::page(&paper.title, STYLE, &out)
 }
 
 fn row(paper: &Paper, number: &Number, measured: &Measured, quick: bool) -> String {
@@ -147,7 +146,7 @@ pub fn index(
     (origin, quick): (&Origin, bool),
 ) -> String {
     let mut out = format!(
-        "{STYLE}<header><h1>The price list</h1>\n<p class=\"lead\">Every number that the five papers print, beside what \
+        "<header><h1>The price list</h1>\n<p class=\"lead\">Every number that the five papers print, beside what \
          this program does on this machine{}.</p></header>\n<p class=\"note\">{}; version {}, commit {}.</p>\n",
         if quick { ", in the quick form" } else { "" },
         escape(&machine(origin)),
@@ -213,7 +212,7 @@ pub fn index(
     }
     out += "</tbody></table></div>\n";
     out += &haptics(measured);
-    wrap("the price list", &out)
+    frame::page("the price list", STYLE, &out)
 }
 
 /// The result of a part in a few words.
@@ -276,7 +275,7 @@ fn haptics(measured: &Measured) -> String {
 /// What the effects of the scenes cost.
 pub fn effects(measured: &Measured) -> String {
     let mut out = format!(
-        "{STYLE}<p><a href=\"index.html\">The book</a></p>\n<header><h1>What effects cost</h1>\n<p class=\"lead\">Processor \
+        "<p><a href=\"index.html\">The book</a></p>\n<header><h1>What effects cost</h1>\n<p class=\"lead\">Processor \
          time of a step with an effect and without it, on one thread.</p></header>\n"
     );
     for (part, report) in measured.effects() {
@@ -309,5 +308,5 @@ pub fn effects(measured: &Measured) -> String {
         }
         out += "</tbody></table></div>\n";
     }
-    wrap("what effects cost", &out)
+    frame::page("what effects cost", STYLE, &out)
 }

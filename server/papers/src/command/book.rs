@@ -1,6 +1,5 @@
 //! `scindo book` runs all studies, part by part, and writes one site.
 
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,12 +12,13 @@ use scindo::command::study_progress::bar;
 use scindo::error::RuntimeError;
 use scindo_program::say;
 use scindo_study::bench::store::Origin;
+use scindo_study::report::frame::put;
 use scindo_study::study::effects::{Request, measure};
 use scindo_study::{Settings, run_with};
 use scindo_world::scene::ShippedScene;
 use serde_json::json;
 
-use super::haptics::{put, write};
+use super::haptics::{unwritten, write};
 use super::library::Named;
 use crate::book::part::{Kind, Part, parts};
 use crate::book::verdict::Verdict;
@@ -65,7 +65,7 @@ pub fn book(args: &BookArgs) -> Result<ExitCode, PapersError> {
                 Ok(()) if stop.load(Ordering::Relaxed) => State::NotRun,
                 Ok(()) => {
                     let finished = part.finish(&args.out, &origin, args.quick, seconds);
-                    finished.map_err(|error| unwritten(&part.folder(&args.out), &error))?;
+                    finished.map_err(|error| unwritten((part.folder(&args.out), error)))?;
                     State::Done
                 }
             }
@@ -118,19 +118,12 @@ fn chosen(args: &BookArgs, all: &[Part]) -> Result<Vec<Part>, PapersError> {
     Ok(all.iter().filter(is_wanted).cloned().collect())
 }
 
-fn unwritten(path: &Path, error: &std::io::Error) -> RuntimeError {
-    RuntimeError::System {
-        what: format!("writing {}", path.display()),
-        reason: format!("{error}; choose another directory with --out"),
-    }
-}
-
 /// Runs a part.
 fn make(part: &Part, args: &BookArgs, stop: &Arc<AtomicBool>, bar: &ProgressBar) -> Result<(), PapersError> {
     let folder = part.folder(&args.out);
     let tell = |what: &str| bar.set_message(format!("{}: {what}", part.name));
     tell("");
-    std::fs::create_dir_all(&folder).map_err(|error| unwritten(&folder, &error))?;
+    std::fs::create_dir_all(&folder).map_err(|error| unwritten((folder.clone(), error)))?;
     match part.kind {
         Kind::Accuracy => {
             let settings = Settings {
@@ -170,7 +163,7 @@ fn make(part: &Part, args: &BookArgs, stop: &Arc<AtomicBool>, bar: &ProgressBar)
             let request = Request { steps: EFFECT_STEPS[usize::from(!args.quick)], stop: stop.clone() };
             let report =
                 measure(&scene, &request, &mut |what, _, _| tell(what)).map_err(RuntimeError::from)?;
-            put(&folder, "effects.json", &format!("{:#}\n", json!(report)))?;
+            put(&folder, [("effects.json", format!("{:#}\n", json!(report)))]).map_err(unwritten)?;
         }
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! `scindo haptics` measures what the hand feels, by hand, delay and loss.
 
-use std::fs;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,6 +11,7 @@ use scindo::command::signals::listen;
 use scindo::command::study_progress::bar;
 use scindo::error::RuntimeError;
 use scindo_program::say;
+use scindo_study::report::frame::put;
 use serde_json::Value;
 
 use crate::error::PapersError;
@@ -52,21 +53,19 @@ pub fn haptics(args: &HapticsArgs) -> Result<ExitCode, PapersError> {
 /// Writes the page, the report and the ticks into `directory`, and returns the report.
 pub(super) fn write(directory: &Path, trials: &[Trial]) -> Result<Value, PapersError> {
     let report = page::json(trials);
-    put(directory, "index.html", &page::html(trials))?;
-    put(directory, "haptics.json", &format!("{report:#}\n"))?;
-    put(directory, "ticks.csv", &page::ticks(trials))?;
+    let files = [
+        ("index.html", page::html(trials)),
+        ("haptics.json", format!("{report:#}\n")),
+        ("ticks.csv", page::ticks(trials)),
+    ];
+    put(directory, files).map_err(unwritten)?;
     Ok(report)
 }
 
-/// Writes a file completely or not at all.
-pub(super) fn put(directory: &Path, name: &str, text: &str) -> Result<(), PapersError> {
-    let (path, draft) = (directory.join(name), directory.join(format!("{name}.part")));
-    let written = fs::create_dir_all(directory)
-        .and_then(|()| fs::write(&draft, text))
-        .and_then(|()| fs::rename(&draft, &path));
-    let failed = |error| RuntimeError::System {
+/// A file that could not be written.
+pub(super) fn unwritten((path, error): (PathBuf, io::Error)) -> RuntimeError {
+    RuntimeError::System {
         what: format!("writing {}", path.display()),
         reason: format!("{error}; choose another directory with --out"),
-    };
-    Ok(written.map_err(failed)?)
+    }
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use scindo_study::report::chart::{Chart, Line};
+use scindo_study::report::frame::page;
 use serde_json::{Value, json};
 
 use super::trial::Trial;
@@ -101,7 +102,7 @@ pub fn html(trials: &[Trial]) -> String {
         let _ = writeln!(body, "<figure>{}<figcaption>{}</figcaption></figure>", chart.html(), chart.title);
     }
     body += "</div>\n</section>\n";
-    scindo_study::report::wrap("what the hand feels", &body)
+    page("what the hand feels", "", &body)
 }
 
 /// Felt and true force along the vertical, and across it.

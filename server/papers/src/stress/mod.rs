@@ -23,8 +23,9 @@ mod json;
 
 mod page;
 
-use std::fs;
 use std::path::Path;
+
+use scindo_study::report::frame::put;
 
 pub use case::{Case, CaseReport, Setting, Status};
 pub use evidence::{Bound, Evidence, Figure};
@@ -36,19 +37,9 @@ pub use suite::{Progress, Settings, StressError, SuiteReport, run, run_case, sel
 /// # Errors
 /// The file and the message of the system.
 pub fn write(directory: &Path, report: &SuiteReport, table: Option<&[Row]>) -> Result<(), StressError> {
-    let io = |path: &Path| {
-        let path = path.to_owned();
-        move |error| StressError::Io { path, error }
-    };
-    fs::create_dir_all(directory).map_err(io(directory))?;
-    for (name, text) in [
-        ("index.html", page::html(report, table)),
-        ("stress.json", format!("{:#}\n", json::suite(report, table))),
-    ] {
-        let (path, draft) = (directory.join(name), directory.join(format!("{name}.part")));
-        fs::write(&draft, text).and_then(|()| fs::rename(&draft, &path)).map_err(io(&path))?;
-    }
-    Ok(())
+    let json = format!("{:#}\n", json::suite(report, table));
+    let files = [("index.html", page::html(report, table)), ("stress.json", json)];
+    put(directory, files).map_err(|(path, error)| StressError::Io { path, error })
 }
 
 #[cfg(test)]

@@ -2,9 +2,8 @@
 
 use std::fmt::Write as _;
 
+use scindo_study::report::frame::page;
 use scindo_study::report::html::{escape, prose};
-use scindo_study::report::view;
-use scindo_study::report::{interactive, style};
 use scindo_study::words::compact;
 
 use super::case::{CaseReport, Status};
@@ -29,29 +28,11 @@ h2 .state { vertical-align: 4px; margin-left: 10px; }
 
 /// The page as one self-contained file.
 pub fn html(report: &SuiteReport, table: Option<&[Row]>) -> String {
-    let mut out = String::with_capacity(1 << 20);
-    out += "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
-    out += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
-    out += "<title>scindo · hard cases</title>\n<style>\n";
-    out += style::PAGE;
-    out += style::COLOURS;
-    out += style::PLOT;
-    out += style::LINES;
-    out += interactive::STYLE;
-    out += STYLE;
-    out += &view::style();
-    out += "</style>\n</head>\n<body>\n<main>\n";
-    out += &opening(report);
-    out += &glance(report);
-    if let Some(rows) = table {
-        out += &mutations(rows);
-    }
-    report.cases.iter().for_each(|case| out += &section(case));
-    out += &closing(report);
-    out += "</main>\n";
-    out += interactive::SCRIPT;
-    out += "</body>\n</html>\n";
-    out
+    let mut body = opening(report) + &glance(report);
+    body.extend(table.map(mutations));
+    body.extend(report.cases.iter().map(section));
+    body += &closing(report);
+    page("hard cases", STYLE, &body)
 }
 
 fn opening(report: &SuiteReport) -> String {
