@@ -29,7 +29,7 @@ pub const GUARANTEES: [Guarantee; 13] = [
     Guarantee {
         number: "G2",
         promise: "A cut is made exactly once, or refused with a reason, whatever the network does",
-        tried_by: "simulator (all faults); `server/runtime/tests/wire.rs`",
+        tried_by: "simulator (all faults); `server/runtime/tests/server/wire.rs`",
         simulated: true,
     },
     Guarantee {
@@ -53,13 +53,13 @@ pub const GUARANTEES: [Guarantee; 13] = [
     Guarantee {
         number: "G6",
         promise: "The same input gives the same bits on any number of threads",
-        tried_by: "`server/world/tests/side_by_side.rs`, and a test per effect; `tests/schedules` for the orders of its threads",
+        tried_by: "`server/world/tests/scenes/side_by_side.rs`, and a test per effect; `tests/schedules` for the orders of its threads",
         simulated: false,
     },
     Guarantee {
         number: "G7",
         promise: "A step that diverges is rolled back, and nothing that is not finite leaves the server",
-        tried_by: "`scindo stress`; `tests/tests/random_scenes.rs`",
+        tried_by: "`scindo stress`; `tests/tests/programs/random_scenes.rs`",
         simulated: false,
     },
     Guarantee {
@@ -89,7 +89,7 @@ pub const GUARANTEES: [Guarantee; 13] = [
     Guarantee {
         number: "G12",
         promise: "Access control does what its table says",
-        tried_by: "`server/runtime/tests/access.rs`: 792 cells of role, key and verb, each by a real client with a certificate",
+        tried_by: "`server/runtime/tests/server/access.rs`: 792 cells of role, key and verb, each by a real client with a certificate",
         simulated: false,
     },
     Guarantee {
