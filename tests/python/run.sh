@@ -1,16 +1,13 @@
 #!/usr/bin/env bash
 # Python against the real programs: the package client/python from an empty environment, a client that knows
 # the wire only, and readers of the results. Needs $SCINDO_TEST_BIN (folder of the programs) and
-# $SCINDO_TEST_PYTHON; with a folder of real meshes in $SCINDO_MODELS it runs those instead of a dirty surface made
-# here.
+# $SCINDO_TEST_PYTHON.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 bin=${SCINDO_TEST_BIN:-target/debug}
 python=${SCINDO_TEST_PYTHON:-python3}
 cache=${SCINDO_TEST_CACHE:-$PWD/tests/.cache}
 keep=${SCINDO_TEST_ARTIFACTS:-$PWD/tests/artifacts}/python
-models=${SCINDO_MODELS:-made}
-steps=${SCINDO_MODEL_STEPS:-100}
 mkdir -p "$keep"
 server=
 finish() { if [ -n "$server" ]; then kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true; fi; }
@@ -72,4 +69,3 @@ server=
 
 echo "-- results on disk"
 timeout 600 "$python" tests/python/recording.py "$bin/scindo" "$keep/recording"
-timeout 1500 "$python" tests/python/models.py "$bin/scindo" "$models" "$keep" --steps "$steps"
