@@ -1,8 +1,9 @@
-//! What tests of cut bodies share: random numbers, a square blade, and a look at a surface from its
+//! What tests of cut bodies share: random vectors, a square blade, and a look at a surface from its
 //! triangle list alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use fastrand::Rng;
 use nalgebra::Vector3;
 
 use crate::cut::Surface;
@@ -12,22 +13,27 @@ pub fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
     Vector3::new(x, y, z)
 }
 
-/// SplitMix64: small, seeded, the same everywhere.
-pub struct Random(pub u64);
+/// Random vectors.
+pub trait Vectors {
+    /// Uniform in the cube of half width `r` around the origin.
+    fn vector(&mut self, r: f64) -> Vector3<f64>;
 
-impl Random {
-    /// Uniform in [0, 1).
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    /// Uniform on the unit sphere.
+    fn direction(&mut self) -> Vector3<f64>;
+}
+
+impl Vectors for Rng {
+    fn vector(&mut self, r: f64) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| (2.0 * self.f64() - 1.0) * r)
     }
 
-    /// Uniform in the cube of half width `r` around the origin.
-    pub fn vector(&mut self, r: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| (2.0 * self.next() - 1.0) * r)
+    fn direction(&mut self) -> Vector3<f64> {
+        loop {
+            let v = self.vector(1.0);
+            if (0.2..1.0).contains(&v.norm()) {
+                return v.normalize();
+            }
+        }
     }
 }
 

@@ -8,30 +8,20 @@
 //! Wang et al. 2021, A large-scale benchmark and an inclusion-based algorithm for continuous collision detection:
 //! kinds of queries.
 
+use fastrand::Rng;
 use nalgebra::Vector3;
 use scindo_collision::{CapsuleMotion, SWEEP_TOLERANCE_M, SurfaceBvh, closest_segment_triangle};
+
+use crate::shapes::vector;
 
 type V = Vector3<f64>;
 
 const QUERIES: u64 = 20_000;
 const RADIUS_M: f64 = 1e-5;
 
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as f64 / (1u64 << 31) as f64
-    }
-
-    fn vector(&mut self, size: f64) -> V {
-        V::from_fn(|_, _| (2.0 * self.next() - 1.0) * size)
-    }
-
-    /// A size between 10⁻⁵ and 1, uniform in its logarithm.
-    fn size(&mut self) -> f64 {
-        10f64.powf(-5.0 * self.next())
-    }
+/// A size between 10⁻⁵ and 1, uniform in its logarithm.
+fn size(random: &mut Rng) -> f64 {
+    10f64.powf(-5.0 * random.f64())
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,15 +41,15 @@ struct Face {
 }
 
 impl Face {
-    fn random(random: &mut Random, kind: Kind) -> Self {
-        let size = 0.1 * random.size().max(1e-3);
-        let mut start = [random.vector(size), random.vector(size), random.vector(size)];
+    fn random(random: &mut Rng, kind: Kind) -> Self {
+        let width = 0.1 * size(random).max(1e-3);
+        let mut start = [(); 3].map(|()| vector(random, width));
         if kind == Kind::Thin {
-            start[2] = start[1] + (start[0] - start[1]) * random.next() + random.vector(1e-9);
+            start[2] = start[1] + (start[0] - start[1]) * random.f64() + vector(random, 1e-9);
         }
-        let speed = 0.1 * random.size();
-        let (all, each) = (random.vector(speed), if kind == Kind::InThePlane { 0.0 } else { 0.2 * speed });
-        let end = start.map(|p| p + all + random.vector(each));
+        let speed = 0.1 * size(random);
+        let (all, each) = (vector(random, speed), if kind == Kind::InThePlane { 0.0 } else { 0.2 * speed });
+        let end = start.map(|p| p + all + vector(random, each));
         let single = |p: V| [p.x as f32, p.y as f32, p.z as f32];
         Self { start: start.map(single), end: end.map(single) }
     }
@@ -78,8 +68,8 @@ impl Face {
 }
 
 /// Coordinates of a point of the face.
-fn place(random: &mut Random, kind: Kind) -> [f64; 3] {
-    let (a, b) = (random.next(), random.next());
+fn place(random: &mut Rng, kind: Kind) -> [f64; 3] {
+    let (a, b) = (random.f64(), random.f64());
     match kind {
         Kind::OnTheRim if a < 0.3 => [1.0, 0.0, 0.0],
         Kind::OnTheRim => [b, 1.0 - b, 0.0],
@@ -92,14 +82,14 @@ fn point(face: &[V; 3], [a, b, c]: [f64; 3]) -> V {
 }
 
 /// A velocity of the kind [m per step].
-fn velocity(random: &mut Random, face: &[V; 3], kind: Kind) -> V {
-    let speed = 0.1 * random.size();
+fn velocity(random: &mut Rng, face: &[V; 3], kind: Kind) -> V {
+    let speed = 0.1 * size(random);
     if kind == Kind::InThePlane {
         let (u, v) = (face[1] - face[0], face[2] - face[0]);
-        let along = u * (2.0 * random.next() - 1.0) + v * (2.0 * random.next() - 1.0);
+        let along = u * (2.0 * random.f64() - 1.0) + v * (2.0 * random.f64() - 1.0);
         return along.try_normalize(1e-12).unwrap_or_else(V::x) * speed;
     }
-    random.vector(speed)
+    vector(random, speed)
 }
 
 /// The gap between capsule and face at `time` [m].
@@ -140,9 +130,9 @@ fn no_vertex_passes_a_face() {
     for kind in KINDS {
         let mut count = Count::default();
         for seed in 0..QUERIES {
-            let mut random = Random(seed);
+            let mut random = Rng::with_seed(seed);
             let face = Face::random(&mut random, kind);
-            let meets = random.next();
+            let meets = random.f64();
             let at = face.at(meets);
             let (p, v) = (point(&at, place(&mut random, kind)), velocity(&mut random, &at, kind));
             let (start, end) = (p - v * meets, p + v * (1.0 - meets));
@@ -158,13 +148,13 @@ fn no_edge_passes_an_edge() {
     for kind in [Kind::General, Kind::InThePlane, Kind::Thin] {
         let mut count = Count::default();
         for seed in 0..QUERIES {
-            let mut random = Random(seed);
+            let mut random = Rng::with_seed(seed);
             let face = Face::random(&mut random, kind);
-            let meets = random.next();
+            let meets = random.f64();
             let at = face.at(meets);
             let p = point(&at, place(&mut random, Kind::OnTheRim));
-            let along = random.vector(0.05);
-            let share = random.next();
+            let along = vector(&mut random, 0.05);
+            let share = random.f64();
             let ends = [p - along * share, p + along * (1.0 - share)];
             let velocities = [velocity(&mut random, &at, kind), velocity(&mut random, &at, kind)];
             // The point of the edge that meets moves by the weighted mean of both, so the edge passes `p`.

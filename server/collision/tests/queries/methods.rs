@@ -1,6 +1,7 @@
 //! Every method of broad phase answers every query like a look at all triangles: on random surfaces, after
 //! deformation, and after triangles were replaced as by a cut.
 
+use fastrand::Rng;
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
 use scindo_collision::{
@@ -8,33 +9,17 @@ use scindo_collision::{
     closest_segment_triangle,
 };
 
+use crate::shapes::vector;
+
 type V = Vector3<f64>;
 
-/// Random numbers in 0..1.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as f64 / (1u64 << 31) as f64
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() * n as f64) as usize
-    }
-
-    fn point(&mut self, reach: f64) -> V {
-        V::from_fn(|_, _| (self.next() * 2.0 - 1.0) * reach)
-    }
-}
-
 /// Triangles without connection, of sizes over four orders of magnitude; some are points or needles.
-fn soup(random: &mut Random, n: usize) -> crate::shapes::Surface {
+fn soup(random: &mut Rng, n: usize) -> crate::shapes::Surface {
     let mut positions = Vec::new();
     for i in 0..n {
-        let centre = random.point(0.1);
-        let size = 0.05 * 10f64.powf(-4.0 * random.next());
-        let corner = |_| (centre + random.point(size)).map(|x| x as f32).into();
+        let centre = vector(random, 0.1);
+        let size = 0.05 * 10f64.powf(-4.0 * random.f64());
+        let corner = |_| (centre + vector(random, size)).map(|x| x as f32).into();
         let mut corners: [[f32; 3]; 3] = [(); 3].map(corner);
         if i % 17 == 0 {
             corners[1] = corners[0];
@@ -57,13 +42,13 @@ fn twisted(positions: &[[f32; 3]], angle: f32) -> Vec<[f32; 3]> {
 }
 
 /// All queries at some random places against a look at all triangles.
-fn assert_answers(surface: &SurfaceBvh, random: &mut Random, what: &str) {
+fn assert_answers(surface: &SurfaceBvh, random: &mut Rng, what: &str) {
     let what = format!("{} {what}", surface.method().name());
     let all = 0..surface.triangle_count() as u32;
     for _ in 0..12 {
-        let (a, b) = (random.point(0.15), random.point(0.15));
-        let capsule = Capsule { core: [a, b], radius: 0.01 * random.next() };
-        let reach = 0.01 * random.next();
+        let (a, b) = (vector(random, 0.15), vector(random, 0.15));
+        let capsule = Capsule { core: [a, b], radius: 0.01 * random.f64() };
+        let reach = 0.01 * random.f64();
         let mut near = Vec::new();
         surface.triangles_near(&capsule, reach, |t| near.push(t.triangle));
         near.sort_unstable();
@@ -90,11 +75,11 @@ fn assert_answers(surface: &SurfaceBvh, random: &mut Random, what: &str) {
 }
 
 /// Sweeps and sides, compared to those of another surface with the same triangles.
-fn assert_equal(surface: &SurfaceBvh, other: &SurfaceBvh, random: &mut Random, what: &str) -> usize {
+fn assert_equal(surface: &SurfaceBvh, other: &SurfaceBvh, random: &mut Rng, what: &str) -> usize {
     let what = format!("{} {what}", surface.method().name());
     let mut hits = 0;
     for _ in 0..20 {
-        let (a, b) = (random.point(0.2), random.point(0.03));
+        let (a, b) = (vector(random, 0.2), vector(random, 0.03));
         let motion = CapsuleMotion { start: [a, a + b], end: [b - a, -a], radius: 0.002 };
         assert_eq!(surface.sweep(&motion), other.sweep(&motion), "{what}: sweep");
         let moving = surface.sweep_moving(&motion);
@@ -139,7 +124,7 @@ fn brute_pairs(surface: &SurfaceBvh) -> Vec<[u32; 2]> {
 
 #[test]
 fn every_method_answers_like_a_look_at_all_triangles() {
-    let mut random = Random(1);
+    let mut random = Rng::with_seed(1);
     let surfaces = [
         ("soup", soup(&mut random, 700)),
         ("ball", crate::shapes::ball(0.1, 9)),
@@ -167,7 +152,7 @@ fn every_method_answers_like_a_look_at_all_triangles() {
 
 #[test]
 fn triangles_replaced_as_by_a_cut_are_found_and_the_old_ones_are_not() {
-    let mut random = Random(2);
+    let mut random = Rng::with_seed(2);
     for method in Method::ALL {
         let (mut positions, mut triangles) = crate::shapes::ball(0.1, 12);
         let mut surface = SurfaceBvh::with_method(method, &positions, &triangles).unwrap();
@@ -180,11 +165,11 @@ fn triangles_replaced_as_by_a_cut_are_found_and_the_old_ones_are_not() {
                 expected = 40;
             } else {
                 // Triangles are divided in three and opened.
-                let first = random.below(triangles.len() - 10);
+                let first = random.usize(0..triangles.len() - 10);
                 for t in first..first + 10 {
                     let [a, b, c] = triangles[t];
                     let middle = [a, b, c].map(|v| V::from(positions[v as usize].map(f64::from)));
-                    let middle = middle.iter().sum::<V>() / 3.0 * (0.8 + 0.3 * random.next());
+                    let middle = middle.iter().sum::<V>() / 3.0 * (0.8 + 0.3 * random.f64());
                     let m = positions.len() as u32;
                     positions.push(middle.map(|x| x as f32).into());
                     triangles[t] = [a, b, m];
@@ -243,7 +228,7 @@ fn a_cut_leaves_an_arrangement_as_good_as_it_was() {
 fn a_worn_tree_is_arranged_anew() {
     // Points of a plane are shuffled: every node then covers the whole plane.
     let n = 4000;
-    let mut random = Random(3);
+    let mut random = Rng::with_seed(3);
     let places: Vec<[f32; 2]> = (0..n).map(|i| [(i % 63) as f32 * 0.01, (i / 63) as f32 * 0.01]).collect();
     let at = |places: &[[f32; 2]]| -> Vec<[f32; 3]> {
         let corners =
@@ -253,7 +238,7 @@ fn a_worn_tree_is_arranged_anew() {
     let triangles: Vec<[u32; 3]> = (0..n as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     let mut shuffled = places.clone();
     for i in 0..n {
-        shuffled.swap(i, random.below(n));
+        shuffled.swap(i, random.usize(0..n));
     }
     for method in [Method::AabbTree, Method::Octree, Method::SphereTree] {
         let mut surface = SurfaceBvh::with_method(method, &at(&places), &triangles).unwrap();

@@ -1,8 +1,9 @@
-//! Closed surfaces for the tests of this crate.
-
-#![allow(dead_code)]
+//! Closed surfaces and random vectors for the tests of this crate.
 
 use std::collections::BTreeMap;
+
+use fastrand::Rng;
+use nalgebra::Vector3;
 
 /// Positions [m] and outward triangles.
 pub type Surface = (Vec<[f32; 3]>, Vec<[u32; 3]>);
@@ -40,6 +41,11 @@ pub fn block(half: [f32; 3], n: usize) -> Surface {
         }
     }
     (positions, triangles)
+}
+
+/// Uniform in the cube of half width `r` around the origin.
+pub fn vector(random: &mut Rng, r: f64) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| (2.0 * random.f64() - 1.0) * r)
 }
 
 /// A ball of radius `radius` [m]: a cube's faces blown up.

@@ -1,9 +1,10 @@
 //! Refinement and coarsening of cells: structure, fields, momentum, and when they happen.
 
+use fastrand::Rng;
 use nalgebra::Vector3;
 
 use super::surface::OctreeSurface;
-use super::tests::{Odd, Random, check_numbering, check_vertices, cube, link};
+use super::tests::{Odd, check_numbering, check_vertices, cube, link};
 use super::*;
 use crate::element::MaterialPoint;
 
@@ -18,9 +19,9 @@ fn families(octree: &Octree) -> Vec<Family> {
 }
 
 /// Leaves of a random part of the interior.
-fn some_leaves(octree: &Octree, random: &mut Random, part: f64) -> Vec<u32> {
+fn some_leaves(octree: &Octree, random: &mut Rng, part: f64) -> Vec<u32> {
     (0..octree.cells().len() as u32)
-        .filter(|&id| octree.cells()[id as usize].level > 0 && random.next() < part)
+        .filter(|&id| octree.cells()[id as usize].level > 0 && random.f64() < part)
         .collect()
 }
 
@@ -39,7 +40,7 @@ fn assert_same(a: &Octree, b: &Octree) {
 
 #[test]
 fn an_octree_that_is_refined_and_coarsened_back_is_the_one_it_was() {
-    let mut random = Random(5);
+    let mut random = Rng::with_seed(5);
     for levels in 1..4 {
         let mut octree = cube(32, levels);
         let start = octree.clone();
@@ -67,7 +68,7 @@ fn an_octree_that_is_refined_and_coarsened_back_is_the_one_it_was() {
 
 #[test]
 fn random_changes_keep_structure_mass_momentum_and_surface() {
-    let mut random = Random(11);
+    let mut random = Rng::with_seed(11);
     let (mut n_joined, mut n_vanished) = (0, 0);
     for round in 0..12 {
         let levels = 1 + (round % 3) as u8;
@@ -79,7 +80,7 @@ fn random_changes_keep_structure_mass_momentum_and_surface() {
             _ => Octree::fill(&Odd, OctreeSettings { cells: 48, levels }, &|_| 0).unwrap(),
         };
         let mut surface = OctreeSurface::build(&octree);
-        let vector = |random: &mut Random| Vector3::new(random.next(), random.next(), random.next());
+        let vector = |random: &mut Rng| Vector3::new(random.f64(), random.f64(), random.f64());
         let mut v: Vec<Vector3<f64>> = octree.points().iter().map(|_| vector(&mut random)).collect();
         let mut x = octree.rest_positions();
         x.iter_mut().for_each(|x| *x += 0.01 * vector(&mut random));
@@ -91,8 +92,8 @@ fn random_changes_keep_structure_mass_momentum_and_surface() {
                 change.new_vertices.iter().for_each(|p| values.push(p.position(values)));
             };
             [&mut x, &mut v].into_iter().for_each(|values| extend(values, &refined));
-            let axis = random.below(3) as u8;
-            let at = [0, 1, 2].map(|k| random.below(size[k]));
+            let axis = random.i32(0..3) as u8;
+            let at = [0, 1, 2].map(|k| random.i32(0..size[k]));
             let cuts: Vec<(LinkKey, CutLink)> = (0..36)
                 .map(|k| {
                     let mut at = at;
@@ -108,7 +109,7 @@ fn random_changes_keep_structure_mass_momentum_and_surface() {
 
             let before = octree.clone();
             let mass = octree.vertex_masses(1000.0);
-            let chosen: Vec<Family> = families(&octree).into_iter().filter(|_| random.next() < 0.7).collect();
+            let chosen: Vec<Family> = families(&octree).into_iter().filter(|_| random.f64() < 0.7).collect();
             let change = octree.coarsen(&chosen, &free);
             (n_joined, n_vanished) = (n_joined + change.joined, n_vanished + change.vanished.len());
             check_vertices(&octree);
@@ -175,7 +176,7 @@ fn projection_keeps_what_coarse_cells_can_represent_and_vetoes_count() {
     let mut octree = cube(16, 2);
     let coarse = octree.clone();
     let linear = |p: &Vector3<f64>| Vector3::new(1.0 + 2.0 * p.y, p.x - p.z, 0.5 * p.z);
-    octree.divide_leaves(&some_leaves(&octree, &mut Random(1), 1.0));
+    octree.divide_leaves(&some_leaves(&octree, &mut Rng::with_seed(1), 1.0));
     let mut v: Vec<Vector3<f64>> = octree.rest_positions().iter().map(linear).collect();
     let mass = octree.vertex_masses(1.0);
     let none = octree.clone().coarsen(&families(&octree), &|_, _| true);

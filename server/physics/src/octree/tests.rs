@@ -1,5 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
+use fastrand::Rng;
 use nalgebra::Vector3;
 
 use super::*;
@@ -143,20 +144,6 @@ fn a_solid_that_no_cell_can_fill_is_refused() {
     assert!(matches!(Octree::fill(&cube, settings, &|_| 0), Err(OctreeError::TooMany { .. })));
 }
 
-/// Random numbers in 0 … 1, the same on every run.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f64 / f64::from(1 << 24)
-    }
-
-    pub fn below(&mut self, n: i32) -> i32 {
-        (self.next() * f64::from(n)) as i32
-    }
-}
-
 pub fn link(incision: u32) -> CutLink {
     CutLink { at: [0.5; 2], normal: [Vector3::x(); 2], incision }
 }
@@ -177,7 +164,7 @@ fn masses(octree: &Octree) -> Vec<f64> {
 
 #[test]
 fn random_cuts_keep_eight_vertices_per_cell_and_the_field_and_momentum() {
-    let mut random = Random(3);
+    let mut random = Rng::with_seed(3);
     for round in 0..40 {
         let levels = (round % 4) as u8;
         let mut octree = if round % 2 == 0 {
@@ -185,7 +172,7 @@ fn random_cuts_keep_eight_vertices_per_cell_and_the_field_and_momentum() {
         } else {
             Octree::fill(&Odd, OctreeSettings { cells: 24, levels }, &|_| 0).unwrap()
         };
-        let mut value: Vec<f64> = (0..octree.n_vertices()).map(|_| random.next()).collect();
+        let mut value: Vec<f64> = (0..octree.n_vertices()).map(|_| random.f64()).collect();
         for incision in 1..4 {
             let before = octree.clone();
             let moment = |octree: &Octree, value: &[f64]| {
@@ -193,10 +180,10 @@ fn random_cuts_keep_eight_vertices_per_cell_and_the_field_and_momentum() {
             };
             let earlier = (moment(&octree, &value), masses(&octree).iter().sum::<f64>());
             // A patch of links across one plane, and some links at random.
-            let axis = random.below(3) as u8;
+            let axis = random.i32(0..3) as u8;
             let size = octree.lattice().size.map(|n| n as i32);
-            let plane = random.below(size[usize::from(axis)]);
-            let corner = [0, 1, 2].map(|k| random.below(size[k]));
+            let plane = random.i32(0..size[usize::from(axis)]);
+            let corner = [0, 1, 2].map(|k| random.i32(0..size[k]));
             let mut cuts = Vec::new();
             for s in 0..size.into_iter().max().unwrap() / 2 {
                 for t in 0..7 {
@@ -208,8 +195,8 @@ fn random_cuts_keep_eight_vertices_per_cell_and_the_field_and_momentum() {
                 }
             }
             for _ in 0..3 {
-                let at = [0, 1, 2].map(|k| random.below(size[k]));
-                cuts.push(((at, random.below(3) as u8), link(incision)));
+                let at = [0, 1, 2].map(|k| random.i32(0..size[k]));
+                cuts.push(((at, random.i32(0..3) as u8), link(incision)));
             }
             let change = octree.cut(&cuts);
             check_vertices(&octree);
@@ -314,7 +301,7 @@ fn plane(p: Vector3<f64>, normal: Vector3<f64>) -> Vec<crate::cut::SweepTriangle
 
 #[test]
 fn a_plane_divides_a_deformed_body_into_two() {
-    let mut random = Random(11);
+    let mut random = Rng::with_seed(11);
     for round in 0..30 {
         let mut octree = if round % 3 == 0 {
             Octree::fill(&Odd, OctreeSettings { cells: 30, levels: 2 }, &|_| 0).unwrap()
@@ -323,15 +310,15 @@ fn a_plane_divides_a_deformed_body_into_two() {
         };
         let loose = octree.components().len();
         // Bent, sheared and moved.
-        let bend = 0.4 * random.next();
+        let bend = 0.4 * random.f64();
         let place = |X: Vector3<f64>| {
             Vector3::new(X.x + bend * X.z * X.z + 0.1, X.y - 0.2 * X.x, X.z + 0.1 * (3.0 * X.y).sin())
         };
         let x: Vec<Vector3<f64>> = octree.rest_positions().into_iter().map(place).collect();
-        let normal = Vector3::new(random.next() - 0.5, random.next() - 0.5, random.next() - 0.5);
+        let normal = Vector3::new(random.f64() - 0.5, random.f64() - 0.5, random.f64() - 0.5);
         let middle = place(
             Vector3::repeat(if round % 3 == 0 { 0.0 } else { 0.5 })
-                + 0.2 * Vector3::new(random.next(), random.next(), random.next()),
+                + 0.2 * Vector3::new(random.f64(), random.f64(), random.f64()),
         );
         let triangles = plane(middle, normal);
         let cuts = octree.crossed_links(&x, &triangles, 1);
@@ -432,7 +419,7 @@ fn volumes_areas_and_quadrature_points_fill_the_body() {
 
 #[test]
 fn volumes_follow_cuts_and_refinement_to_the_bit() {
-    let mut random = Random(5);
+    let mut random = Rng::with_seed(5);
     for round in 0..12 {
         let mut octree = if round % 3 == 0 {
             Octree::fill(&Odd, OctreeSettings { cells: 30, levels: 2 }, &|_| 0).unwrap()
@@ -443,12 +430,12 @@ fn volumes_follow_cuts_and_refinement_to_the_bit() {
         let mut hung = false;
         for step in 0..6 {
             let change = if step % 3 == 2 {
-                let at = [0, 1, 2].map(|_| (16.0 * random.next()) as i32);
+                let at = [0, 1, 2].map(|_| (16.0 * random.f64()) as i32);
                 octree.refine(&[at], 0)
             } else {
                 let x = octree.rest_positions();
-                let normal = Vector3::new(random.next() - 0.5, random.next() - 0.5, random.next() - 0.5);
-                let p = x[(random.next() * x.len() as f64) as usize];
+                let normal = Vector3::new(random.f64() - 0.5, random.f64() - 0.5, random.f64() - 0.5);
+                let p = x[(random.f64() * x.len() as f64) as usize];
                 octree.cut(&octree.crossed_links(&x, &plane(p, normal), 1 + step))
             };
             let before = volumes.clone();

@@ -1,5 +1,6 @@
 //! The force against the geometry, its potential and the load stiffness.
 
+use fastrand::Rng;
 use nalgebra::{Rotation3, Vector3};
 
 use super::{Follower, Pressure};
@@ -8,7 +9,7 @@ use crate::body::{Body, BodySettings, ElementKind};
 use crate::element::MaterialPoint;
 use crate::material::{Law, Material, Rayleigh};
 use crate::mesh::{BoxPattern, box_hexes, box_mesh};
-use crate::testing::Random;
+use crate::testing::Vectors as _;
 
 const PASCALS: f64 = 300.0;
 const RUBBER: Material = Material {
@@ -40,7 +41,7 @@ fn faces(body: &Body, on: impl Fn(&Vector3<f64>) -> bool) -> (Pressure, Vec<Vect
 }
 
 fn deformed(rest: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-    let mut random = Random(7);
+    let mut random = Rng::with_seed(7);
     rest.iter().map(|X| 1.5 * X + random.vector(0.02) + Vector3::new(4.0, -3.0, 2.0)).collect()
 }
 

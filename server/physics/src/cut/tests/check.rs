@@ -3,13 +3,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use fastrand::Rng;
 use nalgebra::{Matrix4, Vector3};
 
 use crate::cut::shell::surface_builder::{Material, SurfaceBuilder};
 use crate::cut::topology::fragments::NONE;
 use crate::cut::{CutMesh, SolidCells};
 use crate::mesh::TET_FACES;
-use crate::testing::{Random, surface_is_closed_and_manifold};
+use crate::testing::{Vectors as _, surface_is_closed_and_manifold};
 
 /// Runs all checks.
 pub fn everything(cut: &CutMesh) {
@@ -39,7 +40,7 @@ pub fn solid_fills_the_surface(cut: &CutMesh) {
     let at_rest = volumes(&rest);
     assert!(at_rest.iter().all(|&volume| volume > -1e-12 * total));
     assert!((at_rest.iter().sum::<f64>() - total).abs() < 1e-10 * total);
-    let mut random = Random(7);
+    let mut random = Rng::with_seed(7);
     let shift = 0.3 * total.cbrt();
     let moved: Vec<_> = rest.iter().map(|x| x + random.vector(shift)).collect();
     let (filled, enclosed) = (volumes(&moved).iter().sum::<f64>(), cut.surface().volume(&moved));
@@ -188,7 +189,7 @@ pub fn copies_are_components(cut: &CutMesh) {
 /// However the copies move, all fragments agree on the position of a vertex, and so does the surface.
 pub fn material_hangs_together(cut: &CutMesh) {
     let f = &cut.fragments;
-    let mut random = Random(7);
+    let mut random = Rng::with_seed(7);
     let x: Vec<Vector3<f64>> = (0..cut.n_copies()).map(|_| random.vector(1.0)).collect();
     let mut place: Vec<Option<Vector3<f64>>> = vec![None; f.vertices.len()];
     for t in 0..f.tets.len() {
@@ -211,7 +212,7 @@ pub fn surface_is_that_of_a_new_build(cut: &CutMesh) {
     let (fresh, _) = SurfaceBuilder::build(&Material { mesh: cut.mesh(), fragments: f, pieces: &cut.pieces });
     assert!(fresh.joints() == cut.builder.joints(), "half-edges are paired differently");
     assert_eq!(fresh.counts(), cut.builder.counts(), "vertices and edges between the same vertices");
-    let mut random = Random(8);
+    let mut random = Rng::with_seed(8);
     let x: Vec<Vector3<f64>> = (0..cut.n_copies()).map(|_| random.vector(1.0)).collect();
     for (id, (t, v)) in cut.builder.corners(f) {
         let piece = &cut.pieces()[f.piece[t as usize] as usize];

@@ -152,7 +152,7 @@ fn a_blade_that_trembles_cuts_like_a_steady_one() {
     let h = 1.0 / 6.0;
     let topologies = [(0.1, 0.0), (0.1, 0.02), (0.1, 0.1), (0.02, 0.02), (0.02, 0.1)].map(|(step, off)| {
         let mut body = Body::unit(6);
-        let mut random = Random(12);
+        let mut random = Rng::with_seed(12);
         let mut place = |x: f64, y: f64| v(x, y, 0.47) + random.vector(off * h);
         for k in 0..=(1.2 / (step * h)) as u32 {
             let x = -0.1 + step * h * f64::from(k);

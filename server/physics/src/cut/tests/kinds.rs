@@ -163,7 +163,7 @@ fn every_kind_of_cut_in_every_unit() {
 fn random_cuts_in_every_unit() {
     for seed in 0..6 {
         let cut = |unit: f64| {
-            let mut random = Random(500 + seed);
+            let mut random = Rng::with_seed(500 + seed);
             let mut body = Body::new([unit; 3], [3; 3], BoxPattern::Tet6);
             for k in 0..15 {
                 let mut at = || random.vector(0.9 * unit) + Vector3::repeat(0.5 * unit);

@@ -10,11 +10,12 @@ mod parts;
 mod random;
 mod refusals;
 
+use fastrand::Rng;
 use nalgebra::Vector3;
 
 use super::{BladeSweep, CutMesh, CutReport};
 use crate::mesh::{BoxPattern, box_mesh};
-use crate::testing::{Random, square, surface_is_closed_and_manifold, v};
+use crate::testing::{Vectors as _, square, surface_is_closed_and_manifold, v};
 
 /// A body under test with the position of every copy.
 struct Body {

@@ -4,7 +4,7 @@ use super::*;
 use crate::cut::{CutError, CutLimits, Work};
 
 /// Random blade positions through a unit box and beyond [m].
-fn zigzag(random: &mut Random, segments: usize) -> BladeSweep {
+fn zigzag(random: &mut Rng, segments: usize) -> BladeSweep {
     let mut place = || random.vector(0.8) + Vector3::repeat(0.5);
     BladeSweep { segments: (0..segments).map(|_| [place(), place()]).collect() }
 }
@@ -42,7 +42,7 @@ fn sweep_in_parts(body: &mut Body, blade: &BladeSweep, incision: u32, fragments:
 
 #[test]
 fn a_sweep_in_parts_has_the_bits_of_one_at_once() {
-    let mut random = Random(5);
+    let mut random = Rng::with_seed(5);
     for (cells, segments) in [(2, 40), (3, 20), (4, 10)] {
         let (mut whole, mut parted) = (Body::unit(cells), Body::unit(cells));
         for incision in 1..4 {
@@ -64,7 +64,7 @@ fn a_sweep_in_parts_has_the_bits_of_one_at_once() {
 fn a_body_takes_no_more_fragments_than_it_may_hold() {
     let limits = CutLimits { fragments: 300, pieces: usize::MAX, copies: usize::MAX };
     let mut body = Body::unit(2);
-    let mut random = Random(9);
+    let mut random = Rng::with_seed(9);
     let mut refused = 0;
     for incision in 1..20 {
         let blade = zigzag(&mut random, 10);

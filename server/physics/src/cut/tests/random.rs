@@ -6,7 +6,7 @@ use crate::cut::topology::fragments::MAX_FRAGMENTS_PER_ELEMENT;
 #[test]
 fn twenty_random_planes_through_one_ring() {
     for seed in 0..4 {
-        let mut random = Random(seed);
+        let mut random = Rng::with_seed(seed);
         let mut body = Body::unit(3);
         for k in 0..20 {
             body.cut_plane(v(0.5, 0.5, 0.5) + random.vector(0.1), random.vector(1.0), 3.0, k + 1);
@@ -22,7 +22,7 @@ fn twenty_random_planes_through_one_ring() {
 /// Random sweeps of random blades through one body, some continued, some exactly on lattice planes,
 /// while the copies move at random; all checks after every `check_every` sweeps.
 fn cut_at_random(seed: u64, sweeps: u32, check_every: u32, reach: f64) {
-    let mut random = Random(1000 + seed);
+    let mut random = Rng::with_seed(1000 + seed);
     let pattern =
         if seed.is_multiple_of(2) { BoxPattern::Tet6 } else { BoxPattern::Tet5 { parity: seed % 4 == 1 } };
     let cells = 2 + seed as usize % 3;
@@ -94,7 +94,7 @@ fn collapsed_flat_and_huge_states() {
 
 #[test]
 fn an_element_at_its_cap_refuses_and_says_so() {
-    let mut random = Random(3);
+    let mut random = Rng::with_seed(3);
     let mut body = Body::unit(1);
     let mut refused = 0;
     for k in 0..60 {

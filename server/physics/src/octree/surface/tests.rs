@@ -1,32 +1,11 @@
 use std::collections::BTreeSet;
 
+use fastrand::Rng;
 use nalgebra::Vector3;
 
 use super::super::*;
 use super::*;
-
-/// Random numbers in 0 … 1, the same on every run.
-pub(super) struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f64 / f64::from(1 << 24)
-    }
-
-    fn vector(&mut self) -> Vector3<f64> {
-        Vector3::new(self.next(), self.next(), self.next())
-    }
-
-    pub fn direction(&mut self) -> Vector3<f64> {
-        loop {
-            let v = self.vector() - Vector3::repeat(0.5);
-            if (0.1..0.5).contains(&v.norm()) {
-                return v.normalize();
-            }
-        }
-    }
-}
+use crate::testing::Vectors as _;
 
 pub(super) struct Ball(pub f64);
 
@@ -49,12 +28,12 @@ impl Shape for Ball {
 }
 
 /// A body of single cells taken at random: many touch only in edges and points.
-fn crumbs(random: &mut Random, n: u32, density: f64) -> Octree {
+fn crumbs(random: &mut Rng, n: u32, density: f64) -> Octree {
     let lattice = Lattice { origin: Vector3::new(0.3, -0.2, 0.1), h: 0.25, size: [n; 3], levels: 0 };
     let mut inside = Bits::new(lattice.size);
     for i in 0..(n * n * n) as i32 {
         let n = n as i32;
-        if random.next() < density {
+        if random.f64() < density {
             inside.insert([i % n, i / n % n, i / n / n]);
         }
     }
@@ -203,7 +182,7 @@ fn a_ball_is_round() {
 
 #[test]
 fn cells_that_touch_in_edges_and_points_have_a_closed_surface() {
-    let mut random = Random(5);
+    let mut random = Rng::with_seed(5);
     let mut doubled = 0;
     for round in 0..200 {
         let density = [0.1, 0.3, 0.5, 0.7, 0.9][round % 5];
@@ -239,9 +218,9 @@ impl Shape for Turned {
 
 #[test]
 fn a_turned_box_keeps_sharp_edges() {
-    let mut random = Random(21);
+    let mut random = Rng::with_seed(21);
     for round in 0..10 {
-        let [roll, pitch, yaw] = (random.vector() * 3.0).into();
+        let [roll, pitch, yaw] = (Vector3::from_fn(|_, _| random.f64()) * 3.0).into();
         let half = Vector3::new(0.6, 0.5, 0.35);
         let shape = Turned(nalgebra::Rotation3::from_euler_angles(roll, pitch, yaw), half);
         let octree = Octree::fill(&shape, OctreeSettings { cells: 24, levels: 2 }, &|_| 0).unwrap();
@@ -305,7 +284,7 @@ impl Worst {
 fn sweep_random_bodies(bodies: u64, sweeps: u32) {
     let mut worst = Worst::default();
     for body in 0..bodies {
-        let mut random = Random(100 + body);
+        let mut random = Rng::with_seed(100 + body);
         let mut octree = match body % 4 {
             0 => crumbs(&mut random, 8, 0.85),
             1 => cube(8, (body / 4 % 3) as u8),
@@ -320,9 +299,9 @@ fn sweep_random_bodies(bodies: u64, sweeps: u32) {
         let mut discs = Vec::new();
         for incision in 1..=sweeps {
             let disc = Disc {
-                at: octree.lattice().origin + size.component_mul(&random.vector()),
+                at: octree.lattice().origin + size.component_mul(&Vector3::from_fn(|_, _| random.f64())),
                 normal: random.direction(),
-                radius: size.x * (0.1 + 0.5 * random.next()),
+                radius: size.x * (0.1 + 0.5 * random.f64()),
             };
             discs.push(disc);
             let change = octree.cut(&disc.links(&octree, incision));

@@ -5,12 +5,13 @@ mod own;
 
 use std::collections::BTreeSet;
 
+use fastrand::Rng;
 use nalgebra::Vector3;
 
 use super::{Misfit, Penetration, Skin, SkinSettings, incision};
 use crate::cut::{BladeSweep, CutMesh, CutReport, Surface};
 use crate::mesh::{BoxPattern, box_mesh};
-use crate::testing::{Random, square, surface_is_closed_and_manifold, v};
+use crate::testing::{Vectors as _, square, surface_is_closed_and_manifold, v};
 
 /// A body under test with its skin and the position of every copy.
 struct Body {
@@ -148,7 +149,7 @@ fn partial_branching_and_crossing_cuts_stay_closed() {
 #[test]
 fn random_sweeps_leave_every_skin_closed() {
     for (seed, snapping) in (0..12u64).flat_map(|s| [(s, 0.0), (s, 0.25)]) {
-        let mut random = Random(seed);
+        let mut random = Rng::with_seed(seed);
         let pattern = if seed % 2 == 0 { BoxPattern::Tet6 } else { BoxPattern::Tet5 { parity: false } };
         let divisions = 1 + (seed % 4) as usize;
         let bulge = if seed % 3 == 0 { 0.0 } else { 0.02 };

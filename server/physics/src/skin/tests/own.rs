@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use fastrand::Rng;
 use nalgebra::Vector3;
 
 use super::super::{Kept, Landing, OwnSurface, Skin, SkinSettings};
 use super::{Body, bound_to_pieces};
 use crate::cut::CutMesh;
 use crate::mesh::{BoxPattern, TetMesh, box_mesh};
-use crate::testing::{Random, surface_is_closed_and_manifold, v};
+use crate::testing::{Vectors as _, surface_is_closed_and_manifold, v};
 
 const PLAIN: SkinSettings = SkinSettings { divisions: 4, snapping: 0.0 };
 
@@ -24,7 +25,7 @@ struct Surface {
 impl Surface {
     /// A surface whose vertices lie off those of a regular grid by up to `jitter` of a square, but on the same side or
     /// edge of the box, and `bulge` [m] farther from its centre than they.
-    fn new(n: usize, jitter: f64, bulge: f64, random: &mut Random) -> Self {
+    fn new(n: usize, jitter: f64, bulge: f64, random: &mut Rng) -> Self {
         let mut numbers: BTreeMap<[usize; 3], u32> = BTreeMap::new();
         let mut surface = Self { flat: Vec::new(), vertices: Vec::new(), triangles: Vec::new() };
         let mut number = |at: [usize; 3]| {
@@ -131,7 +132,7 @@ fn a_skin_consists_of_the_triangles_of_its_surface() {
     // Grids that share edges with the mesh, that are coarser and finer than it, and that have nothing in common.
     for (n, jitter) in [(1, 0.0), (2, 0.0), (4, 0.0), (3, 0.0), (1, 0.3), (3, 0.3), (7, 0.3)] {
         for (cells, pattern) in [(2, BoxPattern::Tet6), (3, BoxPattern::Tet5 { parity: false })] {
-            let surface = Surface::new(n, jitter, 0.05, &mut Random(n as u64));
+            let surface = Surface::new(n, jitter, 0.05, &mut Rng::with_seed(n as u64));
             let (body, kept) = surface.worn(cells, pattern, PLAIN);
             assert_eq!(kept.triangles, kept.of, "n = {n}, jitter = {jitter}, {cells} cells");
             assert!((kept.area - 1.0).abs() < 1e-12);
@@ -145,7 +146,7 @@ fn a_skin_consists_of_the_triangles_of_its_surface() {
 #[test]
 fn random_sweeps_cut_skins_of_their_own_triangles() {
     for (seed, snapping) in (0..24u64).flat_map(|s| [(s, 0.0), (s, 0.25)]) {
-        let mut random = Random(seed);
+        let mut random = Rng::with_seed(seed);
         let bulge = if seed % 3 == 0 { 0.0 } else { 0.02 };
         let surface = Surface::new(2 + (seed % 4) as usize, 0.3, bulge, &mut random);
         let (mut body, kept) = surface.worn(2, BoxPattern::Tet6, SkinSettings { divisions: 4, snapping });
@@ -162,7 +163,7 @@ fn random_sweeps_cut_skins_of_their_own_triangles() {
 
 #[test]
 fn a_plane_between_two_halves_cuts_the_skin_straight_and_a_reset_restores_it() {
-    let surface = Surface::new(5, 0.3, 0.03, &mut Random(3));
+    let surface = Surface::new(5, 0.3, 0.03, &mut Rng::with_seed(3));
     let (mut body, _) = surface.worn(3, BoxPattern::Tet6, PLAIN);
     let before = body.skin.surface().clone();
     body.cut_plane(v(0.47, 0.5, 0.5), v(1.0, 0.1, 0.05), 3.0, 1);
@@ -175,7 +176,7 @@ fn a_plane_between_two_halves_cuts_the_skin_straight_and_a_reset_restores_it() {
 
 #[test]
 fn parts_that_do_not_go_together_rest_on_the_boundary() {
-    let surface = Surface::new(4, 0.2, 0.05, &mut Random(5));
+    let surface = Surface::new(4, 0.2, 0.05, &mut Rng::with_seed(5));
     let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [3; 3], BoxPattern::Tet6);
     // One vertex lands nowhere, one where another does, and two have changed places.
     let mut landings = surface.landings(&mesh);

@@ -73,15 +73,15 @@ fn an_incision_that_ends_inside_divides_its_front_without_parting_it() {
 /// In a body that is stretched and moves: new nodes move with the material.
 #[test]
 fn twenty_divisions_of_a_moving_body_keep_volume_and_motion() {
-    let mut random = Random(11);
+    let mut random = Rng::with_seed(11);
     let mut sample = divided(BoxPattern::Tet6);
     let F = Matrix3::new(1.2, 0.1, 0.0, 0.0, 0.9, 0.2, -0.1, 0.0, 1.1);
     let L = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.3, 0.0, 0.0, 0.2);
     sample.deform(F, L);
     for id in 1..=20 {
-        let point = F * Vector3::from_fn(|_, _| 0.2 + 0.6 * random.next());
-        let normal = Vector3::from_fn(|_, _| random.next() - 0.5);
-        sample.cut_plane(point, normal, 0.1 + 0.4 * random.next(), id);
+        let point = F * Vector3::from_fn(|_, _| 0.2 + 0.6 * random.f64());
+        let normal = Vector3::from_fn(|_, _| random.f64() - 0.5);
+        sample.cut_plane(point, normal, 0.1 + 0.4 * random.f64(), id);
         sample.check();
     }
     for node in &sample.nodes {

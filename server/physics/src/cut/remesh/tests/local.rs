@@ -38,7 +38,7 @@ fn a_small_cut_costs_as_much_in_a_mesh_of_sixteen_times_the_size() {
 
 #[test]
 fn a_search_near_the_sweep_finds_what_a_search_of_the_whole_mesh_finds() {
-    let mut random = Random(11);
+    let mut random = Rng::with_seed(11);
     let mut sample = Sample::new([1.0; 3], [7; 3], BoxPattern::Octahedral6);
     sample.nodes.iter_mut().for_each(|node| node.x += random.vector(0.02));
     let [x, v] = sample.state();

@@ -7,13 +7,14 @@ mod local;
 mod random;
 mod settings;
 
+use fastrand::Rng;
 use nalgebra::{Matrix3, Vector3};
 
 use super::complex::det;
 use super::{Nodes, SnapNode, SnapReport, Snapper};
 use crate::cut::{BladeSweep, CutMesh};
 use crate::mesh::{BoxPattern, TetMesh, box_mesh};
-use crate::testing::{Random, surface_is_closed_and_manifold, v};
+use crate::testing::{Vectors as _, surface_is_closed_and_manifold, v};
 
 /// A body under test.
 struct Sample {

@@ -98,7 +98,7 @@ fn a_cut_in_thirty_parts_that_presses_parts_the_body() {
 
 #[test]
 fn random_cuts_that_press_leave_a_sound_body() {
-    let mut random = Random(11);
+    let mut random = Rng::with_seed(11);
     let mut sample = sample(Moves::Press, true);
     let mut collapses = 0;
     for id in 1..=30 {

@@ -1,12 +1,15 @@
 //! Skins that consist of the triangles of a surface.
 
+use fastrand::Rng;
+
 use super::super::super::*;
-use super::super::tests::{Ball, Disc, Random, check_parts, triangles};
+use super::super::tests::{Ball, Disc, check_parts, triangles};
 use super::*;
 use crate::cut::BladeSweep;
 use crate::skin::{Landing, SkinSettings};
 use crate::space::{OctreeSpace, Space};
 use crate::team::Team;
+use crate::testing::Vectors as _;
 
 /// A surface with its vertices [m].
 struct Shell {
@@ -16,11 +19,11 @@ struct Shell {
 
 impl Shell {
     /// The unit ball: `rings` rings of `sectors` squares, of two triangles each.
-    fn ball(rings: u32, sectors: u32, random: &mut Random) -> Self {
+    fn ball(rings: u32, sectors: u32, random: &mut Rng) -> Self {
         let mut vertices = vec![Vector3::z(), -Vector3::z()];
         for i in 1..rings {
             for j in 0..sectors {
-                let [off, turn] = [0.3 * (random.next() - 0.5), 0.3 * (random.next() - 0.5)];
+                let [off, turn] = [0.3 * (random.f64() - 0.5), 0.3 * (random.f64() - 0.5)];
                 let polar = std::f64::consts::PI * (f64::from(i) + off) / f64::from(rings);
                 let azimuth = std::f64::consts::TAU * (f64::from(j) + turn) / f64::from(sectors);
                 let (s, c) = azimuth.sin_cos();
@@ -109,7 +112,7 @@ fn anew(octree: &Octree, dual: &OctreeSurface, skin: &OwnSkin) -> OwnSkin {
 
 #[test]
 fn an_uncut_body_shows_the_surface_as_it_is() {
-    let mut random = Random(3);
+    let mut random = Rng::with_seed(3);
     for (rings, cells) in [(6, 12), (24, 12), (40, 24)] {
         let shell = Shell::ball(rings, 2 * rings, &mut random);
         let space = shell.worn(cells, 2);
@@ -131,7 +134,7 @@ fn an_uncut_body_shows_the_surface_as_it_is() {
 
 #[test]
 fn random_cuts_leave_it_closed_and_far_from_them_as_it_was() {
-    let mut random = Random(11);
+    let mut random = Rng::with_seed(11);
     let shell = Shell::ball(14, 28, &mut random);
     for round in 0..30 {
         let space = shell.worn(11, 2 * (round % 2));
@@ -142,9 +145,9 @@ fn random_cuts_leave_it_closed_and_far_from_them_as_it_was() {
         let mut links: Vec<Vector3<f64>> = Vec::new();
         for incision in 1..=5 {
             let disc = Disc {
-                at: random.direction() * random.next(),
+                at: random.direction() * random.f64(),
                 normal: random.direction(),
-                radius: 0.2 + 1.2 * random.next(),
+                radius: 0.2 + 1.2 * random.f64(),
             };
             let cuts = disc.links(&octree, incision);
             links.extend(cuts.iter().map(|((at, _), _)| octree.lattice().centre(*at)));
@@ -181,7 +184,7 @@ fn random_cuts_leave_it_closed_and_far_from_them_as_it_was() {
 
 #[test]
 fn a_body_that_is_refined_and_cut_keeps_it_and_returns_to_it() {
-    let mut random = Random(5);
+    let mut random = Rng::with_seed(5);
     let shell = Shell::ball(16, 32, &mut random);
     let mut space = shell.worn(24, 2);
     let start = triangles(&space.octree, space.surface());
