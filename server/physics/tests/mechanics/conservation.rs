@@ -7,7 +7,7 @@ use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
-use crate::{DOWN, SOFT, cube, left_face, settings};
+use crate::{DOWN, SOFT, cube, hold_left, left_face, settings};
 
 #[test]
 fn a_body_in_free_fall_falls_with_g_and_does_not_deform() {
@@ -129,8 +129,7 @@ fn weight_rests_on_the_clamp() {
         Material { rayleigh: Rayleigh { mass_1_s: 30.0, stiffness_s: 0.01 }, ..SOFT },
         settings(200, 1e-6),
     );
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    let clamp = hold_left(&mut body);
     for _ in 0..400 {
         let report = body.step(0.01, DOWN, &[]);
         assert_eq!(report.outcome, Outcome::Advanced);

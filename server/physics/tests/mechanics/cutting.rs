@@ -6,7 +6,7 @@ use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
-use crate::{DOWN, SOFT, cube, left_face, settings, tumbling_blade};
+use crate::{DOWN, SOFT, cube, hold_left, settings, tumbling_blade};
 
 /// A blade along z that sweeps the plane x = `at` through a body of 0.1 m.
 fn slice(at: f64, from_y: f64, to_y: f64) -> BladeSweep {
@@ -74,8 +74,7 @@ fn every_fragment_falls_with_g() {
 fn the_loose_half_falls_and_the_clamped_half_holds() {
     let damped = Material { rayleigh: Rayleigh { mass_1_s: 0.0, stiffness_s: 0.01 }, ..SOFT };
     let mut body = cube(4, damped, settings(100, 1e-5));
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     body.cut(&slice(0.06, -0.5, 0.5), 1).unwrap();
     assert_eq!(body.parts().len(), 2);
     let start = parts(&body);
@@ -92,8 +91,7 @@ fn the_loose_half_falls_and_the_clamped_half_holds() {
 #[test]
 fn a_cut_through_the_clamp_glues_nothing_to_air() {
     let mut body = cube(4, SOFT, settings(100, 1e-5));
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     // Just beside the clamped face: the pieces beyond still span clamped nodes, but hold none.
     body.cut(&slice(0.004, -0.5, 0.5), 1).unwrap();
     let free: Vec<bool> = body.parts().free.clone();
@@ -137,8 +135,7 @@ fn a_cut_exactly_through_clamped_nodes_leaves_both_lips_clamped() {
 #[test]
 fn what_holds_no_clamped_node_falls() {
     let mut body = cube(4, SOFT, settings(200, 1e-5));
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     body.cut(&slice(0.0, -0.5, 0.5), 1).unwrap();
     assert_eq!(body.parts().free, [false]);
     body.cut(&slice(0.025, -0.5, 0.5), 2).unwrap();
@@ -149,8 +146,7 @@ fn what_holds_no_clamped_node_falls() {
 fn slivers_do_not_slow_the_solver_or_fly_away() {
     let iterations = |cut: Option<f64>| {
         let mut body = cube(6, SOFT, settings(500, 1e-4));
-        let clamp = left_face(&body);
-        body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+        hold_left(&mut body);
         if let Some(at) = cut {
             body.cut(&slice(at, -0.5, 0.05), 1).unwrap();
         }
@@ -173,8 +169,7 @@ fn slivers_do_not_slow_the_solver_or_fly_away() {
 #[test]
 fn reset_heals_a_cut_and_keeps_the_clamp() {
     let mut body = cube(3, SOFT, settings(50, 1e-6));
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    let clamp = hold_left(&mut body);
     let copies = body.n_copies();
     let report = body.cut(&slice(0.05, -0.5, 0.5), 1).unwrap();
     body.step(0.01, DOWN, &[]);
@@ -243,8 +238,7 @@ fn half_cut_beam_agrees_with_the_reference() {
 fn thirty_cuts_in_all_directions_while_the_body_moves() {
     let damped = Material { rayleigh: Rayleigh { mass_1_s: 0.5, stiffness_s: 0.002 }, ..SOFT };
     let mut body = cube(5, damped, settings(500, 1e-4));
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     let mass = body.total_mass();
     for k in 0..30_u32 {
         body.cut(&tumbling_blade(&body, k), k + 1).unwrap();

@@ -12,7 +12,7 @@ use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
 use scindo_physics::space::OctreeSpace;
 use scindo_physics::team::Team;
 
-use crate::{DOWN, SOFT, bar_mesh, left_face, settings};
+use crate::{DOWN, SOFT, bar_mesh, hold_left, settings};
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -21,8 +21,7 @@ fn bar(threads: usize, simd: Simd) -> Body {
     let material = Material { rayleigh: Rayleigh { mass_1_s: 0.1, stiffness_s: 0.002 }, ..SOFT };
     let settings = BodySettings { threads, simd, ..settings(10, 1e-6) };
     let mut body = Body::new(bar_mesh(), material, settings).unwrap();
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     body
 }
 
@@ -99,8 +98,7 @@ fn cells(simd: Simd) -> Body {
     let octree = Octree::fill(&shape, OctreeSettings { cells: 22, levels: 2 }, &|_| 0).unwrap();
     let settings = BodySettings { simd, ..settings(10, 1e-6) };
     let mut body = Body::of_space(Box::new(OctreeSpace::new(octree)), SOFT, settings).unwrap();
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     body
 }
 
@@ -120,8 +118,7 @@ fn ruined_cube(threads: usize) -> Body {
     }
     let settings = BodySettings { threads, ..settings(500, 1e-5) };
     let mut body = Body::new(mesh, SOFT, settings).unwrap();
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     body
 }
 

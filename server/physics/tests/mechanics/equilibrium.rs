@@ -12,7 +12,7 @@ use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
-use crate::{DOWN, SOFT, apart, left_face};
+use crate::{DOWN, SOFT, apart, hold_left, left_face};
 
 fn statics(arithmetic: Arithmetic, iterations: u32, tolerance: f64) -> BodySettings {
     let solver = PcgSettings { iterations, tolerance };
@@ -22,8 +22,7 @@ fn statics(arithmetic: Arithmetic, iterations: u32, tolerance: f64) -> BodySetti
 fn beam(settings: BodySettings) -> Body {
     let mesh = box_mesh(Vector3::zeros(), Vector3::new(0.2, 0.05, 0.05), [16, 4, 4], BoxPattern::Tet6);
     let mut body = Body::new(mesh, Material { law: Law::Linear, ..SOFT }, settings).unwrap();
-    let held = left_face(&body);
-    body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     body
 }
 

@@ -79,6 +79,13 @@ pub fn left_face(body: &Body) -> Vec<u32> {
     (0..nodes.len() as u32).filter(|&n| nodes[n as usize].x == 0.0).collect()
 }
 
+/// Holds the nodes at x = 0, and names them.
+pub fn hold_left(body: &mut Body) -> Vec<u32> {
+    let clamp = left_face(body);
+    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    clamp
+}
+
 /// Blade number `k` of many in all directions, through the middle of a body of 0.1 m where it is now.
 pub fn tumbling_blade(body: &Body, k: u32) -> BladeSweep {
     let t = f64::from(k);

@@ -10,7 +10,7 @@ use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
-use crate::{DOWN, SOFT, apart, cube, left_face, settings};
+use crate::{DOWN, SOFT, apart, cube, hold_left, settings};
 
 const NEWMARK: Scheme = Scheme::AVERAGE_ACCELERATION;
 
@@ -18,8 +18,7 @@ const NEWMARK: Scheme = Scheme::AVERAGE_ACCELERATION;
 fn beam(law: Law, rayleigh: Rayleigh, settings: BodySettings) -> Body {
     let mesh = box_mesh(Vector3::zeros(), Vector3::new(0.2, 0.05, 0.05), [8, 2, 2], BoxPattern::Tet6);
     let mut body = Body::new(mesh, Material { law, rayleigh, ..SOFT }, settings).unwrap();
-    let held = left_face(&body);
-    body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     body
 }
 

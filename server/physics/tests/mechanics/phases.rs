@@ -3,21 +3,19 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use nalgebra::Vector3;
 use scindo_allocations::allocations;
 use scindo_physics::body::{Body, BodySettings, PcgSettings, Scheme};
 use scindo_physics::material::{Law, Material};
 use scindo_physics::team::phase::Phase;
 
-use crate::{DOWN, SOFT, apart, cube, left_face};
+use crate::{DOWN, SOFT, apart, cube, hold_left};
 
 /// A cube held at its left, of this law and scheme.
 fn held(law: Law, scheme: Scheme) -> Body {
     let solver = PcgSettings { iterations: 200, tolerance: 1e-4 };
     let settings = BodySettings { solver, scheme, ..BodySettings::default() };
     let mut body = cube(3, Material { law, ..SOFT }, settings);
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     body
 }
 

@@ -7,12 +7,11 @@ use scindo_physics::body::{Body, StaticSettings};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
-use crate::{DOWN, SOFT, bar_mesh, left_face, settings};
+use crate::{DOWN, SOFT, bar_mesh, hold_left, left_face, settings};
 
 fn drooping_bar(law: Law) -> Body {
     let mut body = Body::new(bar_mesh(), Material { law, ..SOFT }, settings(10, 1e-3)).unwrap();
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     let report = body.solve_static(DOWN, &StaticSettings::default()).unwrap();
     assert!(report.converged, "{report:?}");
     body

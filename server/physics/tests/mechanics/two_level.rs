@@ -11,7 +11,7 @@ use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
-use crate::{DOWN, SOFT, apart, left_face, tumbling_blade};
+use crate::{DOWN, SOFT, apart, hold_left, tumbling_blade};
 
 fn with(method: Method, scheme: Scheme, tolerance: f64) -> BodySettings {
     let solver = PcgSettings { iterations: 3000, tolerance };
@@ -25,8 +25,7 @@ fn bar(cells: usize, material: Material, settings: BodySettings) -> Body {
         box_mesh(Vector3::zeros(), size, [5 * cells, cells, cells], BoxPattern::Tet5 { parity: false });
     let mut body = Body::new(mesh, material, settings).unwrap();
     assert!(body.is_fast());
-    let clamp = left_face(&body);
-    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    hold_left(&mut body);
     body
 }
 
@@ -166,8 +165,7 @@ fn flat_elements_keep_few_iterations() {
             }
         }
         let mut body = Body::new(mesh, SOFT, with(method, Scheme::ImplicitEuler, 1e-5)).unwrap();
-        let clamp = left_face(&body);
-        body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+        hold_left(&mut body);
         let most = (0..4).map(|_| advance(&mut body, 0.02, &[]).iterations).max().unwrap();
         assert!(body.stiff_motions().substituted > 0);
         (most, body)
