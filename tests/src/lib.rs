@@ -3,6 +3,8 @@
 
 pub mod random_scene;
 
+pub mod scene;
+
 pub mod relay;
 
 use std::io;

@@ -120,6 +120,25 @@ pub struct ToolInput {
     pub client_time_ns: u64,
 }
 
+impl ToolInput {
+    /// The first sample of the tool `id`, held still by `owner`, which touches.
+    #[must_use]
+    pub fn new(id: &str, owner: &str, pose: Isometry3<f64>) -> Self {
+        Self {
+            id: id.into(),
+            owner: owner.into(),
+            pose,
+            passed: Vec::new(),
+            velocity_m_s: Vector3::zeros(),
+            mode: ToolMode::Touch,
+            closed: None,
+            shape: None,
+            seq: 1,
+            client_time_ns: 0,
+        }
+    }
+}
+
 /// A cut asked for by a client, applied once in the next step.
 #[derive(Debug, Clone)]
 pub struct CutRequest {

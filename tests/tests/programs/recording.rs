@@ -6,34 +6,24 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use scindo_tests::scene::{WORLD, ball, block, cut, held};
 use scindo_tests::{free_pair, program, run};
 use serde_json::Value;
 
-const SCENE: &str = r#"
-schema = 1
-name = "pressed and cut"
-world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
-[[body]]
-id = "block"
-mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [5, 5, 5] } }
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-rayleigh = { stiffness_s = 0.02 }
-fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
-[[cut]]
-body = "block"
-at_s = 0.3
-sweep_m = [[[0.05, -0.1, 0.04], [0.05, -0.1, 0.2]], [[0.05, 0.2, 0.04], [0.05, 0.2, 0.2]]]
-[[tool]]
-id = "finger"
-shape = { sphere = { radius_m = 0.01 } }
-path = [
-  { at_s = 0.0, tip_m = [0.07, 0.05, 0.130], mode = "touch" },
-  { at_s = 0.5, tip_m = [0.07, 0.05, 0.103] },
-  { at_s = 9.0, tip_m = [0.02, 0.05, 0.100] },
-]
-"#;
+fn pressed_and_cut() -> String {
+    let keys = "rayleigh = { stiffness_s = 0.02 }\n".to_owned() + &held("z");
+    [
+        WORLD,
+        &block("block", [[0.0; 3], [0.1; 3]], [5; 3], &keys),
+        &cut("block", 0.3, [[[0.05, -0.1, 0.04], [0.05, -0.1, 0.2]], [[0.05, 0.2, 0.04], [0.05, 0.2, 0.2]]]),
+        &ball(
+            "finger",
+            0.01,
+            &[(0.0, [0.07, 0.05, 0.13]), (0.5, [0.07, 0.05, 0.103]), (9.0, [0.02, 0.05, 0.1])],
+        ),
+    ]
+    .concat()
+}
 
 fn text(path: &Path) -> String {
     path.display().to_string()
@@ -53,7 +43,7 @@ fn report(output: &Output, what: &str) -> Value {
 fn a_recording_is_verified_resumed_and_exported() {
     let folder = tempfile::tempdir().expect("a temporary directory");
     let at = |name: &str| text(&folder.path().join(name));
-    fs::write(at("scene.toml"), SCENE).expect("written");
+    fs::write(at("scene.toml"), pressed_and_cut()).expect("written");
     let (scene, file) = (at("scene.toml"), at("run.mcap"));
     let recorded =
         ["run", &scene, "--fast", "--steps", "80", "--record", &file, "--checkpoint-s", "0.05", "--json"];
@@ -134,7 +124,7 @@ fn bad_input_ends_with_code_2() {
 fn a_killed_server_loses_at_most_a_second() {
     let folder = tempfile::tempdir().expect("a temporary directory");
     let (scene, file) = (folder.path().join("scene.toml"), text(&folder.path().join("killed.mcap")));
-    fs::write(&scene, SCENE).expect("written");
+    fs::write(&scene, pressed_and_cut()).expect("written");
     let listen = format!("tcp/127.0.0.1:{}", free_pair());
     let arguments = ["run", &text(&scene), "--record", &file, "--json", "--listen", &listen];
     let mut server = Command::new(program("scindo"))

@@ -24,26 +24,12 @@ use scindo_world::simulation::Simulation;
 use zenoh::sample::SampleKind;
 use zenoh::{Session, Wait as _};
 
+use crate::lab_scene;
+
 const YEAR: Duration = Duration::from_secs(365 * 86400);
 /// Time in which a message certainly arrives on loopback.
 const SETTLE: Duration = Duration::from_millis(700);
 const PREFIX: &str = "scindo/@v1/main/";
-const SCENE: &str = r#"
-schema = 1
-name = "lab"
-world = { gravity_m_s2 = [0, 0, 0], step_s = 0.01 }
-[[body]]
-id = "block"
-mesh = { box = { min_m = [0, 0, 0], max_m = [0.04, 0.04, 0.02], cells = [2, 2, 1] } }
-young_pa = 5e4
-poisson = 0.3
-density_kg_m3 = 1000
-[[body.fix]]
-where = { slab = { axis = "z", from = 0.0, to = 0.05 } }
-[[tool]]
-id = "probe"
-shape = { sphere = { radius_m = 0.005 } }
-"#;
 
 /// Clients of the laboratory, one per role, and a second one that touches.
 const CLIENTS: [(&str, LabRole); 5] = [
@@ -150,7 +136,7 @@ impl Running {
             zenoh_file: Some(folder.path().join("server.json5")),
             ..NetworkConfig::default()
         };
-        let scene = Scene::from_toml(SCENE).unwrap();
+        let scene = Scene::from_toml(&lab_scene()).unwrap();
         let engine = Engine::new(Simulation::new(&scene, Path::new("")).unwrap(), None).unwrap();
         let sessions = Sessions::open(&network).unwrap();
         let session = sessions.haptic.clone();

@@ -20,26 +20,12 @@ use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use zenoh::{Session, Wait as _};
 
+use crate::lab_scene;
+
 const YEAR: Duration = Duration::from_secs(365 * 86400);
 /// Time in which a message certainly arrives on loopback, through a router.
 const SETTLE: Duration = Duration::from_millis(1000);
 const LABS: [&str; 2] = ["anatomy", "surgery"];
-const SCENE: &str = r#"
-schema = 1
-name = "lab"
-world = { gravity_m_s2 = [0, 0, 0], step_s = 0.01 }
-[[body]]
-id = "block"
-mesh = { box = { min_m = [0, 0, 0], max_m = [0.04, 0.04, 0.02], cells = [2, 2, 1] } }
-young_pa = 5e4
-poisson = 0.3
-density_kg_m3 = 1000
-[[body.fix]]
-where = { slab = { axis = "z", from = 0.0, to = 0.05 } }
-[[tool]]
-id = "probe"
-shape = { sphere = { radius_m = 0.005 } }
-"#;
 
 /// A house with a router, two laboratories with a running server each, a teacher in each, and a guest.
 struct Campus {
@@ -79,7 +65,7 @@ impl Campus {
                 zenoh_file: Some(dir.path().join(lab).join("server.json5")),
                 ..NetworkConfig::default()
             };
-            let scene = Scene::from_toml(SCENE).unwrap();
+            let scene = Scene::from_toml(&lab_scene()).unwrap();
             let engine = Engine::new(Simulation::new(&scene, Path::new("")).unwrap(), None).unwrap();
             let config = ServerConfig { realm: lab.to_owned(), ..ServerConfig::default() };
             Server::start(engine, Some(Sessions::open(&network).unwrap()), &config).unwrap()

@@ -13,24 +13,16 @@ use scindo::record::recorder::RecordSettings;
 use scindo::record::replay::{Replay, newest};
 use scindo::record::writer::{Item, TOPICS, WriterThread};
 use scindo::sim::engine::Engine;
+use scindo_tests::scene::{WORLD, block, held};
 use scindo_world::inputs::{CutRequest, Inputs, ToolInput, ToolMode, ToolShape};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 
-const SCENE: &str = r#"
-schema = 1
-name = "recorded"
-world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
-effects = { governor = true }
-[[body]]
-id = "block"
-mesh = { box = { min_m = [0, 0, 0], max_m = [0.2, 0.1, 0.1], cells = [14, 7, 7] } }
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-rayleigh = { stiffness_s = 0.02 }
-fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
-"#;
+fn scene() -> Scene {
+    let keys = "rayleigh = { stiffness_s = 0.02 }\n".to_owned() + &held("z");
+    let block = block("block", [[0.0; 3], [0.2, 0.1, 0.1]], [14, 7, 7], &keys);
+    Scene::from_toml(&[WORLD, "effects = { governor = true }\n", &block].concat()).unwrap()
+}
 
 /// Steps of the session: a client cuts in every second one.
 const SESSION: u64 = 400;
@@ -39,16 +31,10 @@ fn inputs(step: u64) -> Inputs {
     let phase = step as f64 * 0.05;
     let tip = Vector3::new(0.1 + 0.05 * phase.sin(), 0.05, 0.103 - 0.006 * (0.3 * phase).sin());
     let tool = ToolInput {
-        id: Arc::from("finger"),
-        owner: Arc::from("hand"),
-        pose: Isometry3::new(tip, Vector3::new(0.1 * phase, 0.2, 0.3)),
-        passed: Vec::new(),
-        velocity_m_s: Vector3::zeros(),
         mode: if step % 60 < 30 { ToolMode::Touch } else { ToolMode::Grab },
-        closed: None,
         shape: Some(ToolShape::Sphere { radius_m: 0.01 }),
         seq: step,
-        client_time_ns: 0,
+        ..ToolInput::new("finger", "hand", Isometry3::new(tip, Vector3::new(0.1 * phase, 0.2, 0.3)))
     };
     let n = (step / 2) as f64;
     let (x, y) = (0.2 * (n * 0.618_034).fract(), 0.1 * (n * 0.754_878).fract());
@@ -69,7 +55,7 @@ fn inputs(step: u64) -> Inputs {
 
 /// Records a session with every kind of order into `file`; the cuts that were made.
 fn record(file: &Path, steps: u64) -> u64 {
-    let scene = Scene::from_toml(SCENE).unwrap();
+    let scene = scene();
     let simulation = Simulation::new(&scene, Path::new("")).unwrap();
     let mut engine = Engine::new(simulation, None).unwrap();
     let checkpoint = Duration::from_millis(50);
@@ -140,7 +126,7 @@ fn a_session_with_a_hundred_cuts_is_the_same_on_one_two_and_three_threads() {
         patient: true,
         threads: 1,
     };
-    let simulation = Simulation::new(&Scene::from_toml(SCENE).unwrap(), Path::new("")).unwrap();
+    let simulation = Simulation::new(&scene(), Path::new("")).unwrap();
     let refused = Engine::new(simulation, None).unwrap().record(settings).unwrap_err().to_string();
     assert!(refused.contains("must not exist yet"), "{refused}");
 }
@@ -148,7 +134,7 @@ fn a_session_with_a_hundred_cuts_is_the_same_on_one_two_and_three_threads() {
 #[test]
 fn an_operator_records_a_part_and_takes_the_state_away() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = Scene::from_toml(SCENE).unwrap();
+    let scene = scene();
     let begin = || Engine::new(Simulation::new(&scene, Path::new("")).unwrap(), None).unwrap();
     let mut engine = begin();
     assert!(engine.begin_recording().unwrap_err().contains("without a folder"));

@@ -8,6 +8,7 @@ use scindo::server::{Server, ServerConfig};
 use scindo::sim::engine::Engine;
 use scindo::wire::session::{NetworkConfig, Sessions};
 use scindo_client::{Link, LinkConfig, LinkError, Role};
+use scindo_tests::scene::{WORLD, block, cut, held};
 use scindo_tests::{PATIENCE, free_pair};
 use scindo_world::inputs::Inputs;
 use scindo_world::scene::Scene;
@@ -17,33 +18,20 @@ use serde_json::Value;
 /// Two by two pixels: an odd number of bytes, after which numbers have to be aligned again.
 const PNG: &[u8] = include_bytes!("../../../../tests/browser/quarters.png");
 
-const SCENE: &str = r##"
-schema = 1
-name = "textured"
-world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
-[[body]]
-id = "block"
-mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [4, 4, 4] } }
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
-look = { colour = "#ff8080", texture = { image = "skin.png", repeat_m = 0.05 } }
-[[body]]
-id = "plain"
-mesh = { box = { min_m = [0.2, 0, 0], max_m = [0.3, 0.1, 0.1], cells = [2, 2, 2] } }
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-[[cut]]
-body = "block"
-at_s = 0.015
-sweep_m = [[[0.05, -0.1, 0.04], [0.05, -0.1, 0.2]], [[0.05, 0.2, 0.04], [0.05, 0.2, 0.2]]]
-"##;
-
 fn simulation(folder: &Path) -> Simulation {
     fs::write(folder.join("skin.png"), PNG).unwrap();
-    Simulation::new(&Scene::from_toml(SCENE).unwrap(), folder).unwrap()
+    let look = "look = { colour = \"#ff8080\", texture = { image = \"skin.png\", repeat_m = 0.05 } }\n";
+    let text = [
+        WORLD,
+        &block("block", [[0.0; 3], [0.1; 3]], [4; 3], &(held("z") + look)),
+        &block("plain", [[0.2, 0.0, 0.0], [0.3, 0.1, 0.1]], [2; 3], ""),
+        &cut(
+            "block",
+            0.015,
+            [[[0.05, -0.1, 0.04], [0.05, -0.1, 0.2]], [[0.05, 0.2, 0.04], [0.05, 0.2, 0.2]]],
+        ),
+    ];
+    Simulation::new(&Scene::from_toml(&text.concat()).unwrap(), folder).unwrap()
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

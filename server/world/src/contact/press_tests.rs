@@ -1,15 +1,13 @@
 //! Tools against a body that deforms.
 
+use super::*;
+use crate::inputs::{ToolInput, ToolMode, ToolShape};
+use crate::scene::checked::ToolSpec;
 use nalgebra::{Isometry3, Vector3};
 use scindo_physics::body::{Body, BodySettings, PcgSettings};
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
-use std::sync::Arc;
-
-use super::*;
-use crate::inputs::{ToolInput, ToolMode, ToolShape};
-use crate::scene::checked::ToolSpec;
 
 type V = Vector3<f64>;
 
@@ -57,18 +55,7 @@ impl Table {
     /// Makes one whole step and returns the force on the tool.
     fn step(&mut self, pose: Isometry3<f64>, mode: ToolMode) -> V {
         self.steps += 1;
-        let sample = ToolInput {
-            id: Arc::from("probe"),
-            owner: Arc::from("test"),
-            pose,
-            passed: Vec::new(),
-            velocity_m_s: V::zeros(),
-            mode,
-            closed: None,
-            shape: None,
-            seq: u64::from(self.steps),
-            client_time_ns: 0,
-        };
+        let sample = ToolInput { mode, seq: u64::from(self.steps), ..ToolInput::new("probe", "test", pose) };
         self.tools.advance(f64::from(self.steps) * STEP_S, &[sample]);
         if let Some((sweep, incision)) = self.tools.take_sweep(0, 0.002) {
             self.body.cut(&sweep, incision).unwrap();

@@ -57,18 +57,7 @@ impl Bench {
     /// One step without the solve.
     fn step_posed(&mut self, pose: Isometry3<f64>, mode: ToolMode) -> &Tool {
         self.time_s += 0.005;
-        let sample = ToolInput {
-            id: Arc::from("probe"),
-            owner: Arc::clone(&self.owner),
-            pose,
-            passed: Vec::new(),
-            velocity_m_s: V::zeros(),
-            mode,
-            closed: None,
-            shape: None,
-            seq: 1,
-            client_time_ns: 0,
-        };
+        let sample = ToolInput { mode, ..ToolInput::new("probe", &self.owner, pose) };
         self.tools.advance(self.time_s, &[sample]);
         let surface = self.body.surface();
         self.positions.clear();
@@ -155,16 +144,8 @@ fn a_hand_over_does_not_drag_the_proxy_along() {
 fn hands_stay_with_their_tools_when_a_guest_leaves() {
     let mut bench = Bench::new(BALL);
     let guest = |id: &str, x: f64| ToolInput {
-        id: Arc::from(id),
-        owner: Arc::from(id),
-        pose: Isometry3::translation(x, 0.0, 0.03),
-        passed: Vec::new(),
-        velocity_m_s: V::zeros(),
-        mode: ToolMode::Touch,
-        closed: None,
         shape: Some(BALL),
-        seq: 1,
-        client_time_ns: 0,
+        ..ToolInput::new(id, id, Isometry3::translation(x, 0.0, 0.03))
     };
     let proxies = |bench: &Bench| -> Vec<f64> {
         (0..bench.tools.len()).map(|i| bench.contacts.hand(i).unwrap().proxy_pose().translation.x).collect()

@@ -1,17 +1,17 @@
 //! Scenes whose octree cells are divided near tools and joined behind them.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
 use scindo_physics::body::AdaptReport;
-use scindo_world::assemble::BuildOptions;
 use scindo_world::inputs::{CutRequest, Inputs, Wants};
 use scindo_world::results::Results;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::{Simulation, Stage};
 use scindo_world::snapshot::Snapshot;
+
+use crate::{run, start_with};
 
 /// A finger comes down on a block, presses it, and leaves to the side.
 const PRESSED: &str = r#"
@@ -46,17 +46,6 @@ const PRESSED: &str = r#"
     body = "block"
     point_m = [0.071, 0.043, 0.062]
 "#;
-
-fn start_with(text: &str, threads: usize) -> Simulation {
-    let scene = Scene::from_toml(text).unwrap();
-    Simulation::with_options(&scene, Path::new(""), BuildOptions { threads, portable: false }).unwrap()
-}
-
-fn steps(sim: &mut Simulation, n: usize) {
-    (0..n).for_each(|_| {
-        sim.step(&Inputs::default());
-    });
-}
 
 fn cells(sim: &Simulation) -> usize {
     sim.bodies()[0].body.n_elements()
@@ -128,14 +117,14 @@ fn cells_are_fine_under_a_finger_and_coarse_again_behind_it() {
 fn reset_while_cells_are_fine_leads_back_to_the_start() {
     let mut sim = start_with(PRESSED, 1);
     let (coarse, groups) = (cells(&sim), sim.bodies()[0].fix_groups.clone());
-    steps(&mut sim, 30);
+    run(&mut sim, 30);
     let first = sim.bodies()[0].body.positions().to_vec();
     assert!(cells(&sim) > coarse);
     sim.reset().unwrap();
     assert_eq!((cells(&sim), &sim.bodies()[0].fix_groups), (coarse, &groups));
     assert_eq!(sim.bodies()[0].adapt_counts().unwrap(), Default::default());
     assert_eq!(sim.bodies()[0].body.positions(), sim.bodies()[0].body.rest_positions());
-    steps(&mut sim, 30);
+    run(&mut sim, 30);
     assert_eq!(sim.bodies()[0].body.positions(), first);
 }
 
@@ -143,7 +132,7 @@ fn reset_while_cells_are_fine_leads_back_to_the_start() {
 fn cells_and_motion_are_the_same_for_every_number_of_threads() {
     let run = |threads| {
         let mut sim = start_with(PRESSED, threads);
-        steps(&mut sim, 45);
+        run(&mut sim, 45);
         let body = &sim.bodies()[0].body;
         (body.positions().to_vec(), body.velocities().to_vec(), sim.bodies()[0].adapt_counts())
     };
@@ -155,7 +144,7 @@ fn cells_and_motion_are_the_same_for_every_number_of_threads() {
 #[test]
 fn a_cut_through_fine_cells_is_taken_back_behind_the_finger() {
     let mut sim = start_with(PRESSED, 1);
-    steps(&mut sim, 30);
+    run(&mut sim, 30);
     let fine = cells(&sim);
     let mass = sim.bodies()[0].body.total_mass();
     let at = |y: f64| [Vector3::new(0.072, y, 0.12), Vector3::new(0.072, y, 0.055)];
@@ -163,13 +152,13 @@ fn a_cut_through_fine_cells_is_taken_back_behind_the_finger() {
         CutRequest { request: 1, tool: Arc::from("knife"), body: None, segments: vec![at(-0.01), at(0.09)] };
     sim.step(&Inputs { cuts: vec![request], ..Inputs::default() });
     assert!(cells(&sim) > fine);
-    steps(&mut sim, 69);
+    run(&mut sim, 69);
     let flaws = sim.bodies()[0].body.flaws();
     assert!(flaws.surface == 0 && flaws.volume < 1e-12, "{flaws:?}");
     sim.undo().unwrap();
     let undone = cells(&sim);
     assert_eq!(undone, fine);
-    steps(&mut sim, 30);
+    run(&mut sim, 30);
     // Nothing but the finger made these cells fine.
     assert!(cells(&sim) < undone, "{} of {undone}", cells(&sim));
     assert!((sim.bodies()[0].body.total_mass() / mass - 1.0).abs() < 1e-12);
@@ -205,7 +194,7 @@ fn free_fall_keeps_its_momentum_while_cells_come_and_go() {
         .replace("distance_m = [0.02, 0.03]", "speed_m_s = [1.0, 0.5], distance_m = [0.02, 0.03]");
     let mut sim = start_with(&text, 1);
     let coarse = cells(&sim);
-    steps(&mut sim, 20);
+    run(&mut sim, 20);
     let body = &sim.bodies()[0].body;
     let expected = Vector3::new(0.0, 0.0, -9.81 * 0.2) * body.total_mass();
     assert!((body.momentum() - expected).norm() < 1e-6 * expected.norm(), "{}", body.momentum());
@@ -276,11 +265,11 @@ fn what_is_off_or_quiet_costs_nothing() {
     let off = still.replace(", adapt = { distance_m = [0.02, 0.03], every_steps = 2 }", "");
     assert!(off != still && still.len() < PRESSED.len());
     let (mut quiet, mut off) = (start_with(&still, 1), start_with(&off, 1));
-    steps(&mut quiet, 40);
-    steps(&mut off, 40);
+    run(&mut quiet, 40);
+    run(&mut off, 40);
     for sim in [&mut quiet, &mut off] {
         let before = allocations();
-        steps(sim, 20);
+        run(sim, 20);
         assert_eq!(allocations() - before, 0);
     }
     assert_eq!(quiet.bodies()[0].body.positions(), off.bodies()[0].body.positions());

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use nalgebra::{Isometry3, Vector3};
+use scindo_tests::scene::{WORLD, block, cut, held};
 use scindo_world::assemble::BuildOptions;
 use scindo_world::inputs::{CutRequest, Inputs, ToolInput, ToolMode, ToolShape};
 use scindo_world::scene::Scene;
@@ -69,34 +70,20 @@ fn nothing(_: u64) -> Inputs {
     Inputs::default()
 }
 
-const BLOCK: &str = r#"
-schema = 1
-world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
-[[body]]
-id = "block"
-mesh = { box = { min_m = [0, 0, 0], max_m = [0.2, 0.1, 0.1], cells = [14, 7, 7] } }
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-rayleigh = { stiffness_s = 0.02 }
-fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
-"#;
+static BLOCK: LazyLock<String> = LazyLock::new(|| {
+    let keys = "rayleigh = { stiffness_s = 0.02 }\n".to_owned() + &held("z");
+    WORLD.to_owned() + &block("block", [[0.0; 3], [0.2, 0.1, 0.1]], [14, 7, 7], &keys)
+});
 
 /// A ball that presses and a cut of a client in every second step.
 fn press_and_cut(step: u64) -> Inputs {
     let phase = step as f64 * 0.05;
     let tip = Vector3::new(0.1 + 0.05 * phase.sin(), 0.05, 0.103 - 0.006 * (0.3 * phase).sin());
     let ball = ToolInput {
-        id: Arc::from("finger"),
-        owner: Arc::from("hand"),
-        pose: Isometry3::translation(tip.x, tip.y, tip.z),
-        passed: Vec::new(),
-        velocity_m_s: Vector3::zeros(),
         mode: if step % 60 < 30 { ToolMode::Touch } else { ToolMode::Grab },
-        closed: None,
         shape: Some(ToolShape::Sphere { radius_m: 0.01 }),
         seq: step,
-        client_time_ns: 0,
+        ..ToolInput::new("finger", "hand", Isometry3::translation(tip.x, tip.y, tip.z))
     };
     // Slits along x and y in turn, at places that fill the top evenly.
     let n = (step / 2) as f64;
@@ -130,7 +117,7 @@ const SESSION: u64 = 400;
 
 #[test]
 fn a_session_with_a_hundred_cuts_goes_on_from_twenty_random_steps() {
-    let scene = Scene::from_toml(BLOCK).unwrap();
+    let scene = Scene::from_toml(&BLOCK).unwrap();
     let mut counted = start(&scene, 2);
     run(&mut counted, 0..SESSION);
     assert!(counted.cuts_applied() >= 100, "only {} cuts were made", counted.cuts_applied());
@@ -154,7 +141,7 @@ fn quadratic_elements_that_are_cut_go_on() {
 #[test]
 fn a_pressure_that_changes_and_follows_the_surface_goes_on() {
     let side = "[[body.load]]\nwhere = { slab = { axis = \"x\", from = 1, to = 1 } }\npressure_pa = 300\n";
-    let text = format!("{BLOCK}{side}table = [[0, 0], [0.1, 1], [0.3, 0.2]]\n");
+    let text = format!("{}{side}table = [[0, 0], [0.1, 1], [0.3, 0.2]]\n", *BLOCK);
     goes_on(&Scene::from_toml(&text).unwrap(), 40, &random(4, 30), &press_and_cut);
 }
 
@@ -193,47 +180,36 @@ fn every_way_of_computing_goes_on() {
 }
 
 /// Three blocks: one rests with friction on a slope and carries another; the third folds onto itself.
-const PILE: &str = r#"
+fn pile() -> String {
+    let damped = "rayleigh = { stiffness_s = 0.02 }";
+    [
+        r#"
 schema = 1
 world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01, contact = { friction = 0.4 } }
 effects = { body_collision = true, self_collision = true, sleep = true }
 obstacle = [{ id = "floor", half_space = { point_m = [0, 0, 0], normal = [0.1, 0, 1] }, friction = 0.5 }]
-[[body]]
-id = "lower"
-mesh = { box = { min_m = [0, 0, 0.01], max_m = [0.1, 0.1, 0.06], cells = [4, 4, 2] } }
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-rayleigh = { stiffness_s = 0.02 }
-[[body]]
-id = "upper"
-mesh = { box = { min_m = [0.02, 0.02, 0.065], max_m = [0.08, 0.08, 0.11], cells = [3, 3, 2] } }
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-rayleigh = { stiffness_s = 0.02 }
-[[body]]
-id = "cells"
-element = "octree"
-mesh = { box = { min_m = [0.2, 0, 0.0], max_m = [0.3, 0.1, 0.08], cells = [5, 5, 4] } }
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-rayleigh = { stiffness_s = 0.02 }
-[[cut]]
-body = "cells"
-at_s = 0.1
-sweep_m = [[[0.25, -0.1, 0.03], [0.25, -0.1, 0.2]], [[0.25, 0.2, 0.03], [0.25, 0.2, 0.2]]]
-"#;
+"#,
+        &block("lower", [[0.0, 0.0, 0.01], [0.1, 0.1, 0.06]], [4, 4, 2], damped),
+        &block("upper", [[0.02, 0.02, 0.065], [0.08, 0.08, 0.11]], [3, 3, 2], damped),
+        &block(
+            "cells",
+            [[0.2, 0.0, 0.0], [0.3, 0.1, 0.08]],
+            [5, 5, 4],
+            &format!("element = \"octree\"\n{damped}"),
+        ),
+        &cut("cells", 0.1, [[[0.25, -0.1, 0.03], [0.25, -0.1, 0.2]], [[0.25, 0.2, 0.03], [0.25, 0.2, 0.2]]]),
+    ]
+    .concat()
+}
 
 #[test]
 fn bodies_that_touch_and_stick_go_on() {
-    goes_on(&Scene::from_toml(PILE).unwrap(), 150, &random(6, 140), &nothing);
+    goes_on(&Scene::from_toml(&pile()).unwrap(), 150, &random(6, 140), &nothing);
 }
 
 #[test]
 fn damaged_and_foreign_checkpoints_are_refused_and_change_nothing() {
-    let scene = Scene::from_toml(BLOCK).unwrap();
+    let scene = Scene::from_toml(&BLOCK).unwrap();
     let mut sim = start(&scene, 1);
     run(&mut sim, 0..5);
     let (good, hash) = (sim.checkpoint().unwrap(), sim.state_hash());
@@ -256,12 +232,12 @@ fn damaged_and_foreign_checkpoints_are_refused_and_change_nothing() {
 
 #[test]
 fn values_that_were_changed_while_it_ran_are_kept() {
-    let mut sim = start(&Scene::from_toml(BLOCK).unwrap(), 1);
+    let mut sim = start(&Scene::from_toml(&BLOCK).unwrap(), 1);
     run(&mut sim, 0..5);
     sim.set("body.block.young_pa", "5e4").unwrap();
     sim.step(&nothing(0));
     let checkpoint = sim.checkpoint().unwrap();
-    let mut other = Simulation::new(&Scene::from_toml(BLOCK).unwrap(), Path::new("")).unwrap();
+    let mut other = Simulation::new(&Scene::from_toml(&BLOCK).unwrap(), Path::new("")).unwrap();
     other.restore(&checkpoint).unwrap();
     assert_eq!(other.scene().bodies[0].young_pa, 5e4);
     for simulation in [&mut sim, &mut other] {

@@ -72,16 +72,8 @@ fn steady_contact_does_not_allocate() {
         .iter()
         .zip(modes)
         .map(|(spec, mode)| ToolInput {
-            id: Arc::from(spec.id.as_str()),
-            owner: Arc::from("test"),
-            pose: Isometry3::identity(),
-            passed: Vec::new(),
-            velocity_m_s: V::zeros(),
             mode,
-            closed: None,
-            shape: None,
-            seq: 1,
-            client_time_ns: 0,
+            ..ToolInput::new(spec.id.as_str(), "test", Isometry3::identity())
         })
         .collect();
     let forces = vec![V::z() * -0.01; 256];

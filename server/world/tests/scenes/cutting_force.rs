@@ -1,11 +1,10 @@
 //! Cutting with force: a blade deforms the tissue before it, and cuts where its load exceeds the toughness.
 
-use std::path::Path;
-
 use nalgebra::Vector3;
 use scindo_world::inputs::Inputs;
-use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
+
+use crate::start;
 
 /// A block of 10 × 6 × 4 cm, held below, and a blade along y that goes from 2 mm above it by `down` and `aside` [m] in
 /// `seconds`.
@@ -49,10 +48,6 @@ fn scene(
         y = aside - 0.06,
         z = 0.042 - down,
     )
-}
-
-fn start(text: &str) -> Simulation {
-    Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap()
 }
 
 struct Course {

@@ -1,15 +1,15 @@
 //! Forceps on an upright sheet of tissue: grip, slip, release; and tools of several capsules that push.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
-use scindo_world::assemble::BuildOptions;
 use scindo_world::contact::model::{ContactModels, ToolQuery};
 use scindo_world::inputs::{Inputs, ToolInput, ToolMode, ToolShape, Wants};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::{Snapshot, ToolSnapshot};
+
+use crate::{start, start_with};
 
 type V = Vector3<f64>;
 
@@ -54,22 +54,15 @@ struct Table {
 
 impl Table {
     fn new(text: &str) -> Self {
-        let sim = Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap();
+        let sim = start(text);
         Self { sim, inputs: Inputs::default(), shot: Snapshot::default() }
     }
 
     fn step(&mut self, tip: V, mode: ToolMode, closed: Option<f64>) -> &ToolSnapshot {
         self.inputs.tools = vec![ToolInput {
-            id: Arc::from("forceps"),
-            owner: Arc::from("left"),
-            pose: Isometry3::translation(tip.x, tip.y, tip.z),
-            passed: Vec::new(),
-            velocity_m_s: V::zeros(),
             mode,
             closed,
-            shape: None,
-            seq: 1,
-            client_time_ns: 0,
+            ..ToolInput::new("forceps", "left", Isometry3::translation(tip.x, tip.y, tip.z))
         }];
         self.sim.step(&self.inputs);
         self.sim.snapshot_into(&Wants::default(), &mut self.shot);
@@ -104,10 +97,8 @@ fn around() -> V {
 
 /// The same grip on one thread and on three: all bits of the tissue and of the force.
 fn grip_on(threads: usize) -> (Vec<V>, V) {
-    let options = BuildOptions { threads, portable: false };
     let mut table = Table::new(&scene(0.3));
-    table.sim =
-        Simulation::with_options(&Scene::from_toml(&scene(0.3)).unwrap(), Path::new(""), options).unwrap();
+    table.sim = start_with(&scene(0.3), threads);
     table.hold(around(), 0.4);
     let tool = table.carry(around(), around() + V::new(0.004, 0.003, 0.001), 0.4);
     (table.positions(), tool.force_n)
@@ -280,7 +271,7 @@ fn a_shape_of_forceps_needs_all_its_lengths() {
 #[test]
 fn two_hands_raise_a_flap() {
     let text = include_str!("../../scenes/two-hands.toml");
-    let mut sim = Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap();
+    let mut sim = start(text);
     let wants = Wants { measures: true, ..Wants::default() };
     let (mut shot, mut pull, mut load) = (Snapshot::default(), 0.0_f64, 0.0_f64);
     let mut after = |sim: &mut Simulation, until_s: f64| {

@@ -1,49 +1,33 @@
 //! Forces of contact for clients: they balance, and they are gathered only for those who ask.
 
-use std::path::Path;
-
 use nalgebra::Vector3;
+use scindo_tests::scene::{FLOOR, WORLD, ball, block};
 use scindo_world::inputs::{Inputs, Wants};
-use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::Snapshot;
 use scindo_world::snapshot::forces::{ForceKind, ForcePair, MAX_FORCE_POINTS};
 
+use crate::start;
+
 const G: f64 = 9.81;
 
 /// A block of 1 kg on a floor, one of half that mass on top of it, and a ball that presses on the upper one.
-const STACK: &str = r#"
-schema = 1
-world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
-effects = { body_collision = true }
-[[body]]
-id = "lower"
-mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [6, 6, 6] } }
-young_pa = 1e5
-poisson = 0.3
-density_kg_m3 = 1000
-rayleigh = { mass_1_s = 20.0, stiffness_s = 0.01 }
-[[body]]
-id = "upper"
-mesh = { box = { min_m = [0, 0, 0.1], max_m = [0.1, 0.1, 0.15], cells = [6, 6, 3] } }
-young_pa = 1e5
-poisson = 0.3
-density_kg_m3 = 1000
-rayleigh = { mass_1_s = 20.0, stiffness_s = 0.01 }
-[[obstacle]]
-id = "ceiling"
-half_space = { point_m = [0, 0, 1], normal = [0, 0, -1] }
-[[obstacle]]
-id = "floor"
-half_space = { point_m = [0, 0, 0], normal = [0, 0, 1] }
-[[tool]]
-id = "ball"
-shape = { sphere = { radius_m = 0.02 } }
-path = [{ at_s = 0, tip_m = [0.05, 0.05, 0.3] }, { at_s = 0.5, tip_m = [0.05, 0.05, 0.165] }]
-"#;
+fn stack() -> String {
+    let keys = "young_pa = 1e5\npoisson = 0.3\nrayleigh = { mass_1_s = 20.0, stiffness_s = 0.01 }";
+    [
+        WORLD,
+        "effects = { body_collision = true }\n",
+        &block("lower", [[0.0; 3], [0.1; 3]], [6; 3], keys),
+        &block("upper", [[0.0, 0.0, 0.1], [0.1, 0.1, 0.15]], [6, 6, 3], keys),
+        "[[obstacle]]\nid = \"ceiling\"\nhalf_space = { point_m = [0, 0, 1], normal = [0, 0, -1] }\n",
+        FLOOR,
+        &ball("ball", 0.02, &[(0.0, [0.05, 0.05, 0.3]), (0.5, [0.05, 0.05, 0.165])]),
+    ]
+    .concat()
+}
 
 fn stepped(steps: u32) -> (Simulation, Snapshot) {
-    let mut sim = Simulation::new(&Scene::from_toml(STACK).unwrap(), Path::new("")).unwrap();
+    let mut sim = start(&stack());
     let wants = Wants { forces: true, ..Wants::default() };
     for _ in 0..steps {
         sim.step(&Inputs { wants: wants.clone(), ..Inputs::default() });

@@ -1,32 +1,18 @@
 //! What a forecast says is what the run then does.
 
-use std::path::Path;
+use std::sync::LazyLock;
 
+use scindo_tests::scene::{WORLD, block, cut, held};
 use scindo_world::forecast::{Effort, Ending, Forecast, forecast};
 use scindo_world::inputs::Inputs;
-use scindo_world::scene::Scene;
-use scindo_world::simulation::Simulation;
+
+use crate::start;
 
 /// A block that hangs sideways from a wall.
-const BLOCK: &str = r#"
-schema = 1
-[world]
-gravity_m_s2 = [0, 0, -9.81]
-step_s = 0.02
-[[body]]
-id = "block"
-mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.04, 0.04], cells = [10, 4, 4] } }
-young_pa = 1e5
-poisson = 0.4
-density_kg_m3 = 1000
-solver = { iterations = 400, tolerance = 1e-4 }
-[[body.fix]]
-where = { slab = { axis = "x", from = 0, to = 0 } }
-"#;
-
-fn start(text: &str) -> Simulation {
-    Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap()
-}
+static BLOCK: LazyLock<String> = LazyLock::new(|| {
+    let keys = "young_pa = 1e5\nsolver = { iterations = 400, tolerance = 1e-4 }\n".to_owned() + &held("x");
+    WORLD.replace("0.01", "0.02") + &block("block", [[0.0; 3], [0.1, 0.04, 0.04]], [10, 4, 4], &keys)
+});
 
 fn foretold(text: &str, processor_s: f64, end_s: f64) -> Forecast {
     let effort = Effort { processor_s, end_s: Some(end_s) };
@@ -67,12 +53,9 @@ fn substeps_of_an_explicit_integrator_are_part_of_its_price() {
 
 #[test]
 fn what_a_cut_frees_and_what_stands_still_until_then_is_foretold() {
-    let text = format!(
-        "{BLOCK}{}",
-        "[[cut]]\nbody = \"block\"\nat_s = 6.0\n\
-         sweep_m = [[[0.05, -0.1, -0.5], [0.05, -0.1, 0.5]], [[0.05, 0.5, -0.5], [0.05, 0.5, 0.5]]]\n"
-    )
-    .replace("solver =", "rayleigh = { stiffness_s = 0.02 }\nsolver =");
+    let sweep = [[[0.05, -0.1, -0.5], [0.05, -0.1, 0.5]], [[0.05, 0.5, -0.5], [0.05, 0.5, 0.5]]];
+    let text =
+        BLOCK.replace("solver =", "rayleigh = { stiffness_s = 0.02 }\nsolver =") + &cut("block", 6.0, sweep);
     let said = foretold(&text, 60.0, 6.5);
     assert!(said.steps < 200, "six seconds are 300 steps: {said}");
     assert_eq!(said.bodies[0].free_parts, 1);

@@ -1,21 +1,17 @@
 //! What changes while a scene runs: every key on the list has its effect, present values have none.
 
-use std::path::Path;
-
 use nalgebra::Vector3;
+use scindo_tests::scene::{WORLD, block, held};
 use scindo_world::inputs::Inputs;
-use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
+
+use crate::start;
 
 /// A bar that hangs from its end, on the path that `how` asks for.
 fn bar(how: &str) -> Simulation {
-    let text = format!(
-        "schema = 1\n[world]\ngravity_m_s2 = [0, 0, -1]\nstep_s = 0.01\n[effects]\nenergy = false\n[[body]]\n\
-         id = \"bar\"\n{how}\nyoung_pa = 1e5\npoisson = 0.3\ndensity_kg_m3 = 1000\n\
-         mesh = {{ box = {{ min_m = [0, 0, 0], max_m = [0.05, 0.05, 0.2], cells = [2, 2, 6] }} }}\n\
-         [[body.fix]]\nwhere = {{ slab = {{ axis = \"z\", from = 1, to = 1 }} }}\n"
-    );
-    Simulation::new(&Scene::from_toml(&text).unwrap(), Path::new("")).unwrap()
+    let keys = format!("{how}\nyoung_pa = 1e5\npoisson = 0.3\n{}", held("z").replace("= 0", "= 1"));
+    let head = WORLD.replace("-9.81", "-1") + "effects = { energy = false }\n";
+    start(&(head + &block("bar", [[0.0; 3], [0.05, 0.05, 0.2]], [2, 2, 6], &keys)))
 }
 
 const FAST: &str = "rayleigh = { mass_1_s = 1.0, stiffness_s = 0.01 }\nsolver = { tolerance = 1e-5 }";

@@ -32,15 +32,48 @@ mod spans;
 mod stabbed_blade;
 mod steady;
 mod texture;
+#[cfg(target_os = "linux")]
 mod threads;
 mod touching;
 mod undo;
 mod viscoelastic;
 
+use std::path::Path;
 use std::process::Command;
+
+use scindo_world::assemble::BuildOptions;
+use scindo_world::inputs::{Inputs, Wants};
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+use scindo_world::snapshot::Snapshot;
 
 #[global_allocator]
 static ALLOCATOR: scindo_allocations::Counting = scindo_allocations::Counting;
+
+/// The simulation of a scene that needs no files.
+fn start(text: &str) -> Simulation {
+    Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap()
+}
+
+/// The same on so many threads.
+fn start_with(text: &str, threads: usize) -> Simulation {
+    let options = BuildOptions { threads, portable: false };
+    Simulation::with_options(&Scene::from_toml(text).unwrap(), Path::new(""), options).unwrap()
+}
+
+/// Steps without input.
+fn run(sim: &mut Simulation, steps: usize) {
+    for _ in 0..steps {
+        sim.step(&Inputs::default());
+    }
+}
+
+/// What somebody sees who wants the surfaces.
+fn shown(sim: &mut Simulation) -> Snapshot {
+    let mut snapshot = Snapshot::default();
+    sim.snapshot_into(&Wants { surface: vec![true], ..Wants::default() }, &mut snapshot);
+    snapshot
+}
 
 /// Whether this process runs nothing but the test `name`; if not, the test is run in a process of its own. For tests of
 /// what all tests of a process share: its threads, and which places in the code are logged.

@@ -1,40 +1,23 @@
 //! Bodies on obstacles: they land, rest, slide and stick, and nothing goes through.
 
-use std::path::Path;
+use std::sync::LazyLock;
 
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
 use scindo_physics::body::Outcome;
-use scindo_world::assemble::BuildOptions;
+use scindo_tests::scene::{FLOOR, WORLD, block};
 use scindo_world::inputs::Inputs;
 use scindo_world::results::Results;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 
+use crate::{start, start_with};
+
 /// A block 5 mm above a floor.
-const BLOCK: &str = r#"
-    schema = 1
-    world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
-    [[body]]
-    id = "block"
-    mesh = { box = { min_m = [-0.05, -0.05, 0.005], max_m = [0.05, 0.05, 0.065], cells = [5, 5, 3] } }
-    young_pa = 2e4
-    poisson = 0.4
-    density_kg_m3 = 1000
-    rayleigh = { stiffness_s = 0.005 }
-    [[obstacle]]
-    id = "floor"
-    half_space = { point_m = [0, 0, 0], normal = [0, 0, 1] }
-"#;
-
-fn start(text: &str) -> Simulation {
-    start_with(text, 1)
-}
-
-fn start_with(text: &str, threads: usize) -> Simulation {
-    let scene = Scene::from_toml(text).unwrap();
-    Simulation::with_options(&scene, Path::new(""), BuildOptions { threads, portable: false }).unwrap()
-}
+static BLOCK: LazyLock<String> = LazyLock::new(|| {
+    let corners = [[-0.05, -0.05, 0.005], [0.05, 0.05, 0.065]];
+    [WORLD, &block("block", corners, [5, 5, 3], "rayleigh = { stiffness_s = 0.005 }"), FLOOR].concat()
+});
 
 /// Steps and checks what holds in every step: it advances, and nothing sinks in by more than `depth` cells.
 fn steps(sim: &mut Simulation, n: usize, depth: f64) {
@@ -59,7 +42,7 @@ fn speed(sim: &Simulation) -> f64 {
 
 #[test]
 fn a_block_lands_and_comes_to_rest_on_the_floor() {
-    let mut sim = start(BLOCK);
+    let mut sim = start(&BLOCK);
     steps(&mut sim, 300, 0.05);
     let (body, report) = (&sim.bodies()[0].body, *sim.rest_report(0));
     let weight = 9.81 * body.total_mass();
@@ -190,7 +173,7 @@ fn without_obstacles_nothing_changes() {
 
 #[test]
 fn what_begins_in_an_obstacle_is_told_and_what_lies_on_one_is_no_loose_body() {
-    assert_eq!(start(BLOCK).warnings(), &[] as &[String]);
+    assert_eq!(start(&BLOCK).warnings(), &[] as &[String]);
     let inside = start(&BLOCK.replace("point_m = [0, 0, 0]", "point_m = [0, 0, 0.03]"));
     assert!(inside.warnings()[0].contains("begins inside the obstacle `floor`"), "{:?}", inside.warnings());
     let beside = start(
@@ -199,7 +182,8 @@ fn what_begins_in_an_obstacle_is_told_and_what_lies_on_one_is_no_loose_body() {
     assert!(beside.warnings()[0].contains("nothing holds the body"), "{:?}", beside.warnings());
     let other = BLOCK[BLOCK.find("[[body]]").unwrap()..BLOCK.find("[[obstacle]]").unwrap()]
         .replace("\"block\"", "\"twin\"");
-    let twins = format!("{BLOCK}{other}").replace("world =", "effects = { body_collision = true }\nworld =");
+    let twins =
+        format!("{}{other}", *BLOCK).replace("world =", "effects = { body_collision = true }\nworld =");
     let twins = start(&twins.replacen("min_m = [-0.05", "min_m = [-0.03", 1));
     assert!(twins.warnings().iter().any(|w| w.contains("begins inside `")), "{:?}", twins.warnings());
 }
@@ -207,8 +191,8 @@ fn what_begins_in_an_obstacle_is_told_and_what_lies_on_one_is_no_loose_body() {
 #[test]
 fn forces_of_contact_are_written_step_by_step() {
     let directory = std::env::temp_dir().join(format!("scindo-contacts-{}", std::process::id()));
-    let scene = Scene::from_toml(BLOCK).unwrap();
-    let mut sim = start(BLOCK);
+    let scene = Scene::from_toml(&BLOCK).unwrap();
+    let mut sim = start(&BLOCK);
     let mut results = Results::begin(&directory, &scene, &sim).unwrap();
     for _ in 0..100 {
         sim.step(&Inputs::default());

@@ -1,22 +1,18 @@
 //! Times of the phases of deforming: there when they are asked for, and then complete.
 
-use std::path::Path;
-
 use scindo_physics::team::phase::Phase;
 use scindo_world::inputs::Inputs;
 use scindo_world::results::Results;
 use scindo_world::scene::Scene;
-use scindo_world::simulation::{Simulation, Stage};
+use scindo_world::simulation::Stage;
+
+use crate::start;
 
 const SCENE: &str = include_str!("fast_and_nonlinear.toml");
 
-fn simulation() -> Simulation {
-    Simulation::new(&Scene::from_toml(SCENE).unwrap(), Path::new("")).unwrap()
-}
-
 #[test]
 fn measured_phases_add_up_to_no_more_than_the_stage_that_deforms() {
-    let mut sim = simulation();
+    let mut sim = start(SCENE);
     sim.measure_phases(true);
     for _ in 0..5 {
         let report = sim.step(&Inputs::default()).clone();
@@ -31,7 +27,7 @@ fn measured_phases_add_up_to_no_more_than_the_stage_that_deforms() {
 
 #[test]
 fn phases_are_measured_only_when_asked_for_and_change_no_bit() {
-    let (mut silent, mut measured) = (simulation(), simulation());
+    let (mut silent, mut measured) = (start(SCENE), start(SCENE));
     measured.measure_phases(true);
     for _ in 0..5 {
         measured.step(&Inputs::default());
@@ -49,7 +45,7 @@ fn phases_are_measured_only_when_asked_for_and_change_no_bit() {
 fn the_summary_lists_phases_that_were_measured() {
     for on in [false, true] {
         let scene = Scene::from_toml(SCENE).unwrap();
-        let mut sim = simulation();
+        let mut sim = start(SCENE);
         sim.measure_phases(on);
         let directory = tempfile::tempdir().unwrap();
         let mut results = Results::begin(directory.path(), &scene, &sim).unwrap();

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use scindo_tests::scene::FLOOR;
 use scindo_world::format::{MeshFile, read_mesh_bytes};
 use scindo_world::inputs::Inputs;
 use scindo_world::results::Results;
@@ -114,14 +115,8 @@ fn an_unwritable_directory_is_named() {
 
 #[test]
 fn the_summary_tells_who_touched_whom() {
-    let scene = format!(
-        "{SCENE}[[obstacle]]\nid = \"floor\"\nhalf_space = {{ point_m = [0, 0, 0], normal = [0, 0, 1] }}\n"
-    );
-    let scene = Scene::from_toml(
-        &scene
-            .replace("id = \"loose\"", "id = \"loose\"\nrayleigh = { mass_1_s = 20.0, stiffness_s = 0.01 }"),
-    )
-    .unwrap();
+    let damped = "id = \"loose\"\nrayleigh = { mass_1_s = 20.0, stiffness_s = 0.01 }";
+    let scene = Scene::from_toml(&(SCENE.replace("id = \"loose\"", damped) + FLOOR)).unwrap();
     let mut sim = Simulation::new(&scene, Path::new("")).unwrap();
     let directory = tempfile::tempdir().unwrap();
     let mut results = Results::begin(directory.path(), &scene, &sim).unwrap();

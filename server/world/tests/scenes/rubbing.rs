@@ -1,15 +1,14 @@
 //! Dry friction under a ball that is pressed into a block and drawn aside.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
-use scindo_world::assemble::BuildOptions;
 use scindo_world::contact::model::{ContactModels, ToolQuery};
 use scindo_world::inputs::{Inputs, ToolInput, ToolMode, Wants};
-use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::{Snapshot, ToolSnapshot};
+
+use crate::start_with;
 
 type V = Vector3<f64>;
 
@@ -59,8 +58,7 @@ struct Table {
 
 impl Table {
     fn new(text: &str, threads: usize) -> Self {
-        let options = BuildOptions { threads, portable: false };
-        let sim = Simulation::with_options(&Scene::from_toml(text).unwrap(), Path::new(""), options).unwrap();
+        let sim = start_with(text, threads);
         let tip = V::new(0.0, 0.0, 0.03 + 2.0 * RADIUS_M);
         Self { sim, inputs: Inputs::default(), shot: Snapshot::default(), tip }
     }
@@ -72,16 +70,8 @@ impl Table {
         for i in 1..=steps {
             self.tip = from.lerp(&to, i as f64 / steps as f64);
             self.inputs.tools = vec![ToolInput {
-                id: Arc::from("probe"),
-                owner: Arc::from("hand"),
-                pose: Isometry3::translation(self.tip.x, self.tip.y, self.tip.z),
-                passed: Vec::new(),
                 velocity_m_s: (to - from) / seconds,
-                mode: ToolMode::Touch,
-                closed: None,
-                shape: None,
-                seq: 1,
-                client_time_ns: 0,
+                ..ToolInput::new("probe", "hand", Isometry3::translation(self.tip.x, self.tip.y, self.tip.z))
             }];
             self.sim.step(&self.inputs);
             let wants = Wants { contact: true, ..Wants::default() };

@@ -1,11 +1,11 @@
 //! What viewers are told beside surfaces: rest, held parts, stress, probes, looks.
 
-use std::path::Path;
-
 use scindo_world::inputs::{Inputs, Wants};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::Snapshot;
+
+use crate::start;
 
 /// A bar of 0.2 m, its left end held, its right end drawn out by 1 %, free to become thinner.
 const BAR: &str = r##"
@@ -40,10 +40,6 @@ body = "bar"
 point_m = [0.1, 0.01, 0.01]
 "##;
 
-fn simulation(text: &str) -> Simulation {
-    Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap()
-}
-
 fn snapshot(sim: &mut Simulation, wants: &Wants) -> Snapshot {
     let mut snapshot = Snapshot::default();
     sim.snapshot_into(wants, &mut snapshot);
@@ -52,7 +48,7 @@ fn snapshot(sim: &mut Simulation, wants: &Wants) -> Snapshot {
 
 #[test]
 fn stress_and_probes_are_right_and_only_there_for_those_who_ask() {
-    let mut sim = simulation(BAR);
+    let mut sim = start(BAR);
     sim.step(&Inputs::default());
     let nobody = snapshot(&mut sim, &Wants { surface: vec![true], ..Wants::default() });
     assert!(nobody.bodies[0].stress.is_empty() && nobody.bodies[0].energy.is_none());
@@ -83,7 +79,7 @@ sweep_m = [[[0.105, -1, -1], [0.105, -1, 1]], [[0.105, 1, -1], [0.105, 1, 1]]]
     let at = held_left_only.find("[[body.fix]]\nwhere = { slab = { axis = \"x\", from = 1").unwrap();
     let end = at + held_left_only[at..].find("axes = \"x\"\n").unwrap() + "axes = \"x\"\n".len();
     let text = format!("{}{}{cut}", &held_left_only[..at], &held_left_only[end..]);
-    let mut sim = simulation(&text.replace("integrator = \"static\"\n", ""));
+    let mut sim = start(&text.replace("integrator = \"static\"\n", ""));
     let wants = Wants { surface: vec![true], ..Wants::default() };
     let whole = snapshot(&mut sim, &wants).bodies[0].topology.clone();
     assert_eq!(whole.rest.len(), whole.vertex_count as usize);

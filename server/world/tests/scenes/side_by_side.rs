@@ -7,16 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::Vector3;
 use scindo_physics::body::Outcome;
+use scindo_tests::scene::WORLD;
 use scindo_world::assemble::BuildOptions;
 use scindo_world::inputs::Inputs;
 use scindo_world::report::Event;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 
-const WORLD: &str = r#"
-schema = 1
-world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
-"#;
+use crate::start_with;
 
 /// Two and a half thousand tetrahedra on the fast path, which a finger presses and a blade cuts.
 const LARGE: &str = r#"
@@ -65,9 +63,7 @@ density_kg_m3 = 1000
 "#;
 
 fn simulation(parts: &[&str], threads: usize) -> Simulation {
-    let scene = Scene::from_toml(&format!("{WORLD}{}", parts.concat())).unwrap();
-    let options = BuildOptions { threads, portable: false };
-    Simulation::with_options(&scene, Path::new(""), options).unwrap()
+    start_with(&format!("{WORLD}{}", parts.concat()), threads)
 }
 
 /// Positions [m] and velocities [m/s] of a body.

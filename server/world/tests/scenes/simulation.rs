@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use scindo_world::assemble::BuildOptions;
-use scindo_world::inputs::{CutRequest, Inputs, ToolInput, ToolMode, Wants};
+use scindo_world::inputs::{CutRequest, Inputs, ToolInput, Wants};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::Snapshot;
+
+use crate::{run, start};
 
 /// The half-cut beam: 0.03 x 0.06 x 0.2 m, base held, gravity along x, cut to half its depth.
 const BEAM: &str = r#"
@@ -44,16 +46,6 @@ point_m = [0, 0.03, 0.101]
 side = [0, 0, -1]
 "#;
 
-fn simulation(text: &str) -> Simulation {
-    Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap()
-}
-
-fn run(simulation: &mut Simulation, steps: usize) {
-    for _ in 0..steps {
-        simulation.step(&Inputs::default());
-    }
-}
-
 /// Refusals that only show when meshes and selections are built.
 fn refusal(text: &str) -> String {
     Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap_err().to_string()
@@ -61,7 +53,7 @@ fn refusal(text: &str) -> String {
 
 #[test]
 fn a_beam_under_gravity_bends_and_comes_to_rest() {
-    let mut sim = simulation(BEAM);
+    let mut sim = start(BEAM);
     run(&mut sim, 300);
     let body = &sim.bodies()[0].body;
     assert!(body.positions().iter().all(|x| x.iter().all(|c| c.is_finite())));
@@ -75,7 +67,7 @@ fn a_beam_under_gravity_bends_and_comes_to_rest() {
 
 #[test]
 fn a_half_cut_beam_opens_and_probes_stay_on_their_side() {
-    let mut sim = simulation(&format!("{BEAM}{CUT}"));
+    let mut sim = start(&format!("{BEAM}{CUT}"));
     assert_eq!(sim.bodies()[0].epoch(), 0);
     sim.step(&Inputs::default());
     assert!(sim.report().events.iter().any(|event| event.name == "cut-applied"), "{:?}", sim.report().events);
@@ -103,7 +95,7 @@ fn the_result_does_not_depend_on_threads_or_repetition() {
 
 #[test]
 fn reset_repeats_the_run_and_raises_the_epoch() {
-    let mut sim = simulation(&format!("{BEAM}{CUT}"));
+    let mut sim = start(&format!("{BEAM}{CUT}"));
     run(&mut sim, 20);
     let first = sim.bodies()[0].body.positions().to_vec();
     let epoch = sim.bodies()[0].epoch();
@@ -124,25 +116,14 @@ fn reset_repeats_a_touch() {
     let touch = |sim: &mut Simulation, away_m: f64| {
         for step in 0..10_u32 {
             let x = 0.03 + 0.00501 + away_m - 5e-4 * f64::from(step);
-            let tool = ToolInput {
-                id: Arc::from("finger"),
-                owner: Arc::from("hand"),
-                pose: Isometry3::translation(x, 0.03, 0.1),
-                passed: Vec::new(),
-                velocity_m_s: Vector3::zeros(),
-                mode: ToolMode::Touch,
-                closed: None,
-                shape: None,
-                seq: 1,
-                client_time_ns: 0,
-            };
+            let tool = ToolInput::new("finger", "hand", Isometry3::translation(x, 0.03, 0.1));
             sim.step(&Inputs { tools: vec![tool], ..Inputs::default() });
         }
         sim.bodies()[0].body.positions().to_vec()
     };
-    let mut sim = simulation(&with_finger);
+    let mut sim = start(&with_finger);
     let first = touch(&mut sim, 0.0);
-    assert_ne!(first, touch(&mut simulation(&with_finger), 0.1), "the finger touches");
+    assert_ne!(first, touch(&mut start(&with_finger), 0.1), "the finger touches");
     for _ in 0..3 {
         // The finger leaves the tissue before the scene starts again.
         touch(&mut sim, 0.1);
@@ -153,7 +134,7 @@ fn reset_repeats_a_touch() {
 
 #[test]
 fn surfaces_and_energies_are_only_computed_for_those_who_ask() {
-    let mut sim = simulation(BEAM);
+    let mut sim = start(BEAM);
     let mut snapshot = Snapshot::default();
     sim.step(&Inputs::default());
     sim.snapshot_into(&Wants::default(), &mut snapshot);
@@ -172,7 +153,7 @@ fn surfaces_and_energies_are_only_computed_for_those_who_ask() {
 
 #[test]
 fn cuts_of_clients_come_back_with_their_number() {
-    let mut sim = simulation(BEAM);
+    let mut sim = start(BEAM);
     let edge = |x: f64| [Vector3::new(x, -0.001, 0.1), Vector3::new(x, 0.061, 0.1)];
     let request = |request, body: &str, segments| CutRequest {
         request,
@@ -225,9 +206,9 @@ fn what_selects_nothing_or_lies_outside_is_refused_together() {
 #[test]
 fn millimetres_with_si_stiffness_is_warned_about() {
     let text = BEAM.replace("[0.03, 0.06, 0.2]", "[30, 60, 200]");
-    let sim = simulation(&text);
+    let sim = start(&text);
     assert!(sim.warnings().iter().any(|w| w.contains("200.000 m long")), "{:?}", sim.warnings());
-    assert!(simulation(BEAM).warnings().is_empty());
+    assert!(start(BEAM).warnings().is_empty());
 }
 
 #[test]
@@ -249,7 +230,7 @@ fn mesh_files_that_are_missing_or_broken_are_refused_at_their_line() {
 
 #[test]
 fn the_plan_says_what_is_on_and_why_and_off_costs_nothing() {
-    let plan = simulation(BEAM).plan();
+    let plan = start(BEAM).plan();
     let effect = |name: &str| plan.effects.iter().find(|effect| effect.name == name).unwrap();
     assert!(effect("gravity").on && effect("large rotation").on && effect("damping").on);
     assert!(effect("deformation beam").predicted_ms > 0.0);
@@ -264,7 +245,7 @@ fn the_plan_says_what_is_on_and_why_and_off_costs_nothing() {
 
     let quiet = BEAM.replace("[9.81, 0, 0]", "[0, 0, 0]").replace("\"corotational\"", "\"linear\"");
     let quiet = quiet.replace("[world]", "[effects]\ncutting = false\ncontact = false\n[world]");
-    let mut sim = simulation(&quiet);
+    let mut sim = start(&quiet);
     assert!(!sim.plan().is_on("gravity") && !sim.plan().is_on("cutting"));
     let edge = |x: f64| [Vector3::new(x, -0.001, 0.1), Vector3::new(x, 0.061, 0.1)];
     let cut =
@@ -277,7 +258,7 @@ fn the_plan_says_what_is_on_and_why_and_off_costs_nothing() {
 #[test]
 fn an_effect_that_is_off_does_not_change_a_bit() {
     let run_with = |extra: &str| {
-        let mut sim = simulation(&BEAM.replace("[world]", &format!("{extra}\n[world]")));
+        let mut sim = start(&BEAM.replace("[world]", &format!("{extra}\n[world]")));
         run(&mut sim, 30);
         sim.bodies()[0].body.positions().to_vec()
     };
@@ -318,7 +299,7 @@ fn tables_of_loads_and_displacements_are_followed() {
             .replace("cells = [3, 6, 15]", cells)
             .replace("rayleigh = { stiffness_s = 0.01 }", &format!("{element}{linear}\n{keys}"));
         let text = if cells.contains("20") { text.replace(", pattern = \"tet5\"", "") } else { text };
-        let mut sim = simulation(&format!("{text}{tables}"));
+        let mut sim = start(&format!("{text}{tables}"));
         let tip = |sim: &Simulation| {
             let body = &sim.bodies()[0].body;
             let ends =
@@ -354,7 +335,7 @@ fn what_is_held_arrives_over_the_time_it_is_given() {
     let stretched = |body: &str| {
         let fix = "[[body.fix]]\nwhere = { slab = { axis = \"z\", from = 1, to = 1 } }\ndisplacement_m = [0, 0, 0.08]\n";
         let text = BEAM.replacen("rayleigh", &format!("{body}\nrayleigh"), 1);
-        simulation(&format!("{text}{fix}"))
+        start(&format!("{text}{fix}"))
     };
     let top = |sim: &Simulation| -> f64 {
         let (body, group) = (&sim.bodies()[0].body, &sim.bodies()[0].fix_groups[1]);

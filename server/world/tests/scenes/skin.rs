@@ -1,15 +1,16 @@
 //! A body with a skin: what is shown and touched is the skin, cut with the body.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
 use scindo_collision::SurfaceBvh;
 use scindo_world::format::SurfaceMesh;
-use scindo_world::inputs::{Inputs, Wants};
+use scindo_world::inputs::Inputs;
 use scindo_world::mesh_in::Organ;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::Snapshot;
+
+use crate::{shown, start};
 
 const ORGAN: &str = r#"
 schema = 1
@@ -28,18 +29,6 @@ at_s = 0.04
 sweep_m = [[[0.02, -0.1, 0.03], [0.02, -0.1, 0.2]], [[0.02, 0.1, 0.03], [0.02, 0.1, 0.2]]]
 "#;
 
-fn start(text: &str) -> Simulation {
-    let scene = Scene::from_toml(text).unwrap();
-    Simulation::new(&scene, Path::new("")).unwrap()
-}
-
-fn snapshot(sim: &mut Simulation) -> Snapshot {
-    let wants = Wants { surface: vec![true], ..Wants::default() };
-    let mut snapshot = Snapshot::default();
-    sim.snapshot_into(&wants, &mut snapshot);
-    snapshot
-}
-
 /// Enclosed volume [m³], after checking that every edge has two triangles.
 fn volume(snapshot: &Snapshot) -> f64 {
     let body = &snapshot.bodies[0];
@@ -57,7 +46,7 @@ fn volume(snapshot: &Snapshot) -> f64 {
 #[test]
 fn the_skin_lies_on_the_organ_and_is_cut_with_it() {
     let mut sim = start(ORGAN);
-    let uncut = snapshot(&mut sim);
+    let uncut = shown(&mut sim);
     let surface = Organ::Liver.surface();
     let exact = surface_volume(&surface);
     let skin = volume(&uncut);
@@ -69,12 +58,12 @@ fn the_skin_lies_on_the_organ_and_is_cut_with_it() {
     for _ in 0..4 {
         sim.step(&Inputs::default());
     }
-    let cut = snapshot(&mut sim);
+    let cut = shown(&mut sim);
     assert!(sim.bodies()[0].body.skin().unwrap().fits());
     assert!(cut.bodies[0].topology.tags.contains(&1));
     assert!((volume(&cut) / skin - 1.0).abs() < 0.02);
     sim.reset().unwrap();
-    assert_eq!(snapshot(&mut sim).bodies[0].topology.triangles, uncut.bodies[0].topology.triangles);
+    assert_eq!(shown(&mut sim).bodies[0].topology.triangles, uncut.bodies[0].topology.triangles);
 }
 
 fn surface_volume(surface: &SurfaceMesh) -> f64 {
@@ -95,7 +84,7 @@ fn a_skin_of_own_triangles_has_the_shape_of_its_surface() {
         let kept = sim.bodies()[0].body.skin().unwrap().kept().unwrap();
         assert_eq!(kept.of, surface.triangles.len());
         assert!(kept.area > 0.99 && kept.area < 1.0 + 1e-9, "{kept:?}");
-        let uncut = snapshot(&mut sim);
+        let uncut = shown(&mut sim);
         let exact = surface_volume(&surface);
         assert!((volume(&uncut) / exact - 1.0).abs() < 2e-4, "{} instead of {exact}", volume(&uncut));
         // Nearly every triangle that is shown lies in one of the surface.
@@ -113,7 +102,7 @@ fn a_skin_of_own_triangles_has_the_shape_of_its_surface() {
         for _ in 0..4 {
             sim.step(&Inputs::default());
         }
-        let cut = snapshot(&mut sim);
+        let cut = shown(&mut sim);
         assert!(sim.bodies()[0].body.skin().unwrap().fits());
         assert!(cut.bodies[0].topology.tags.contains(&1));
         assert!((volume(&cut) / volume(&uncut) - 1.0).abs() < 0.02);
@@ -134,13 +123,13 @@ fn cells_wear_the_triangles_of_their_surface_too() {
     let kept = sim.bodies()[0].body.kept().unwrap();
     assert_eq!(kept.of, surface.triangles.len());
     assert!(kept.area > 0.99 && kept.area < 1.0 + 1e-9, "{kept:?}");
-    let uncut = snapshot(&mut sim);
+    let uncut = shown(&mut sim);
     let exact = surface_volume(&surface);
     assert!((volume(&uncut) / exact - 1.0).abs() < 2e-4, "{} instead of {exact}", volume(&uncut));
     for _ in 0..4 {
         sim.step(&Inputs::default());
     }
-    let cut = snapshot(&mut sim);
+    let cut = shown(&mut sim);
     let [before, after] = [&uncut, &cut].map(|shown| &shown.bodies[0].topology);
     assert!(after.tags.contains(&1));
     assert!((volume(&cut) / volume(&uncut) - 1.0).abs() < 0.01);
@@ -150,16 +139,16 @@ fn cells_wear_the_triangles_of_their_surface_too() {
         x.sort_unstable();
         x
     };
-    let shown: BTreeSet<_> = after.triangles.iter().map(|t| corners(t, &after.rest)).collect();
-    let stayed = before.triangles.iter().filter(|t| shown.contains(&corners(t, &before.rest))).count();
+    let seen: BTreeSet<_> = after.triangles.iter().map(|t| corners(t, &after.rest)).collect();
+    let stayed = before.triangles.iter().filter(|t| seen.contains(&corners(t, &before.rest))).count();
     let share = stayed as f64 / before.triangles.len() as f64;
     assert!(share > 0.8 && share < 0.99, "{share} of the skin stayed");
     // It comes back with an earlier state, and with the whole body.
     let state = sim.checkpoint().unwrap();
     sim.reset().unwrap();
-    assert_eq!(snapshot(&mut sim).bodies[0].topology.triangles, uncut.bodies[0].topology.triangles);
+    assert_eq!(shown(&mut sim).bodies[0].topology.triangles, uncut.bodies[0].topology.triangles);
     sim.restore(&state).unwrap();
-    let again = snapshot(&mut sim);
+    let again = shown(&mut sim);
     assert_eq!(again.bodies[0].topology.triangles, cut.bodies[0].topology.triangles);
     assert_eq!(again.bodies[0].positions, cut.bodies[0].positions);
 }
@@ -185,7 +174,7 @@ fn own_triangles_need_a_surface_and_no_divisions() {
     let mut sim = start(&coarse);
     let warning = sim.warnings().iter().find(|warning| warning.starts_with("body.organ.skin")).unwrap();
     assert!(warning.contains("triangles of the surface are on the skin"), "{warning}");
-    volume(&snapshot(&mut sim));
+    volume(&shown(&mut sim));
 }
 
 #[test]
@@ -217,12 +206,12 @@ fn a_torn_and_crumpled_surface_still_makes_a_closed_skin() {
     let mut sim = Simulation::new(&Scene::from_toml(&scene).unwrap(), folder.path()).unwrap();
     let kept = sim.bodies()[0].body.skin().unwrap().kept().unwrap();
     assert!(kept.area > 0.6 && kept.area < 1.0, "{kept:?}");
-    let uncut = volume(&snapshot(&mut sim));
+    let uncut = volume(&shown(&mut sim));
     for _ in 0..4 {
         sim.step(&Inputs::default());
     }
     assert!(sim.bodies()[0].body.skin().unwrap().fits());
-    assert!((volume(&snapshot(&mut sim)) / uncut - 1.0).abs() < 0.02);
+    assert!((volume(&shown(&mut sim)) / uncut - 1.0).abs() < 0.02);
 }
 
 #[test]
@@ -242,7 +231,7 @@ fn an_incision_follows_a_path_on_the_skin() {
     for _ in 0..4 {
         sim.step(&Inputs::default());
     }
-    let cut = snapshot(&mut sim);
+    let cut = shown(&mut sim);
     let body = &cut.bodies[0];
     assert!(sim.bodies()[0].body.skin().unwrap().fits());
     let lips = body.topology.triangles.iter().zip(&body.topology.tags).filter(|(_, tag)| **tag == 1);
@@ -266,8 +255,8 @@ fn a_scratch_is_drawn_for_everybody_and_reported() {
     }
     let told = events.iter().find(|event| event.name == "cut-opens-nothing").unwrap();
     assert!(told.message.contains("drawn on the surface") && told.message.contains("mm"), "{told:?}");
-    let shown = snapshot(&mut sim);
-    let body = &shown.bodies[0];
+    let seen = shown(&mut sim);
+    let body = &seen.bodies[0];
     assert!(!body.topology.tags.contains(&1));
     let length = |[p, q]: &[[f32; 3]; 2]| (0..3).map(|k| (q[k] - p[k]).powi(2)).sum::<f32>().sqrt();
     let drawn: f32 = body.marks.iter().map(length).sum();
@@ -281,5 +270,5 @@ fn a_scratch_is_drawn_for_everybody_and_reported() {
         assert!(off < 1e-6, "{off} m off the skin");
     }
     sim.reset().unwrap();
-    assert!(snapshot(&mut sim).bodies[0].marks.is_empty());
+    assert!(shown(&mut sim).bodies[0].marks.is_empty());
 }

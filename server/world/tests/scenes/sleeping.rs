@@ -1,53 +1,25 @@
 //! Bodies that have come to rest sleep, and wake when something touches them.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use scindo_allocations::allocations;
-use scindo_world::assemble::BuildOptions;
-use scindo_world::inputs::{CutRequest, Inputs, ToolInput, ToolMode, ToolShape};
-use scindo_world::scene::Scene;
+use scindo_tests::scene::{FLOOR, WORLD, block};
+use scindo_world::inputs::{CutRequest, Inputs, ToolInput, ToolShape};
 use scindo_world::simulation::Simulation;
 
-/// A table with two blocks on each other, and a third one beside them.
-const SCENE: &str = r#"
-    schema = 1
-    [world]
-    gravity_m_s2 = [0, 0, -9.81]
-    step_s = 0.01
-    [effects]
-    sleep = true
-    body_collision = true
-    [[obstacle]]
-    id = "table"
-    half_space = { point_m = [0, 0, 0], normal = [0, 0, 1] }
-"#;
+use crate::{start, start_with};
 
-fn block(id: &str, [x, y, z]: [f64; 3]) -> String {
-    let (u, v, w) = (x + 0.06, y + 0.06, z + 0.06);
-    format!(
-        r#"
-        [[body]]
-        id = "{id}"
-        mesh = {{ box = {{ min_m = [{x}, {y}, {z}], max_m = [{u}, {v}, {w}], cells = [3, 3, 3] }} }}
-        young_pa = 1e5
-        poisson = 0.4
-        density_kg_m3 = 1000
-        rayleigh = {{ stiffness_s = 0.005 }}
-    "#
-    )
+/// A table with two blocks on each other, and a third one beside them.
+fn table(effects: &str, blocks: &[(&str, [f64; 3])]) -> String {
+    let keys = "young_pa = 1e5\nrayleigh = { stiffness_s = 0.005 }";
+    let block = |&(id, at): &(&str, [f64; 3])| block(id, [at, at.map(|x| x + 0.06)], [3; 3], keys);
+    format!("{WORLD}effects = {{ {effects} }}\n{FLOOR}{}", blocks.iter().map(block).collect::<String>())
 }
 
-fn start(effects: &str, threads: usize) -> Simulation {
-    let text = [
-        &SCENE.replace("sleep = true", effects),
-        &block("low", [0.0, 0.0, 0.001]),
-        &block("high", [0.01, 0.005, 0.063]),
-        &block("beside", [0.2, 0.0, 0.001]),
-    ];
-    let scene = Scene::from_toml(&text.map(String::as_str).concat()).unwrap();
-    Simulation::with_options(&scene, Path::new(""), BuildOptions { threads, portable: false }).unwrap()
+fn three(effects: &str, threads: usize) -> Simulation {
+    let blocks = [("low", [0.0, 0.0, 0.001]), ("high", [0.01, 0.005, 0.063]), ("beside", [0.2, 0.0, 0.001])];
+    start_with(&table(effects, &blocks), threads)
 }
 
 fn asleep(sim: &Simulation) -> [bool; 3] {
@@ -67,7 +39,7 @@ fn run(sim: &mut Simulation, steps: usize, inputs: &Inputs) {
 }
 
 fn settled(threads: usize) -> Simulation {
-    let mut sim = start("sleep = true", threads);
+    let mut sim = three("sleep = true, body_collision = true", threads);
     run(&mut sim, 1000, &Inputs::default());
     assert_eq!(asleep(&sim), [true; 3], "after {} s", sim.time_s());
     sim
@@ -76,16 +48,8 @@ fn settled(threads: usize) -> Simulation {
 /// A finger on top of the upper block, `deep` metres deep.
 fn finger(deep: f64) -> Inputs {
     let tool = ToolInput {
-        id: Arc::from("finger"),
-        owner: Arc::from("hand"),
-        pose: Isometry3::translation(0.04, 0.035, 0.13 - deep),
-        passed: Vec::new(),
-        velocity_m_s: Vector3::zeros(),
-        mode: ToolMode::Touch,
-        closed: None,
         shape: Some(ToolShape::Sphere { radius_m: 0.008 }),
-        seq: 1,
-        client_time_ns: 0,
+        ..ToolInput::new("finger", "hand", Isometry3::translation(0.04, 0.035, 0.13 - deep))
     };
     Inputs { tools: vec![tool], ..Inputs::default() }
 }
@@ -128,10 +92,8 @@ fn a_touch_wakes_a_body_and_those_under_it_alone() {
 /// they sleep.
 #[test]
 fn a_body_that_slept_before_the_first_tool_is_felt() {
-    for effects in ["sleep = true\nbody_collision = false", "sleep = true"] {
-        let scene = SCENE.replace("sleep = true\n    body_collision = true", effects);
-        let text = scene + &block("high", [0.01, 0.005, 0.163]);
-        let mut sim = Simulation::new(&Scene::from_toml(&text).unwrap(), Path::new("")).unwrap();
+    for effects in ["sleep = true, body_collision = false", "sleep = true"] {
+        let mut sim = start(&table(effects, &[("high", [0.01, 0.005, 0.163])]));
         run(&mut sim, 1000, &Inputs::default());
         assert!(sim.is_asleep(0));
         let top = Vector3::new(0.04, 0.035, 0.06);
@@ -147,11 +109,9 @@ fn a_body_that_slept_before_the_first_tool_is_felt() {
 
 #[test]
 fn a_body_that_arrives_wakes_what_it_meets() {
-    let text = [&SCENE.to_owned(), &block("below", [0.0, 0.0, 0.001]), &block("far", [0.3, 0.0, 0.001])];
-    // It falls for 1.2 s while the others sleep.
-    let thrown = block("thrown", [0.01, 0.0, 7.2]);
-    let scene = Scene::from_toml(&(text.map(String::as_str).concat() + &thrown)).unwrap();
-    let mut sim = Simulation::new(&scene, Path::new("")).unwrap();
+    // One falls for 1.2 s while the others sleep.
+    let blocks = [("below", [0.0, 0.0, 0.001]), ("far", [0.3, 0.0, 0.001]), ("thrown", [0.01, 0.0, 7.2])];
+    let mut sim = start(&table("sleep = true, body_collision = true", &blocks));
     let mut slept = false;
     while !sim.is_asleep(0) || !slept {
         sim.step(&Inputs::default());
@@ -189,7 +149,8 @@ fn cuts_and_changed_values_wake_bodies() {
 
 #[test]
 fn it_is_off_unless_asked_for_and_changes_nothing_before_the_first_sleep() {
-    let (mut on, mut off) = (start("sleep = true", 1), start("", 1));
+    let (mut on, mut off) =
+        (three("sleep = true, body_collision = true", 1), three("body_collision = true", 1));
     let mut together = 0;
     while asleep(&on) == [false; 3] {
         assert!(bits(&on) == bits(&off));

@@ -4,7 +4,6 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use crate::is_alone;
 use scindo_world::inputs::Inputs;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
@@ -12,6 +11,8 @@ use tracing::{Subscriber, span};
 use tracing_subscriber::layer::{Context, SubscriberExt as _};
 use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::{EnvFilter, Layer};
+
+use crate::is_alone;
 
 const SCENE: &str = include_str!("fast_and_nonlinear.toml");
 

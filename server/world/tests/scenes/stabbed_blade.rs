@@ -1,13 +1,12 @@
 //! A blade that the mouse stabs in along its own length and then draws aside cuts on against the toughness, whichever
 //! way it goes.
 
-use std::path::Path;
-
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use scindo_collision::{CapsuleMotion, SurfaceBvh};
 use scindo_world::inputs::{Inputs, ToolInput, ToolMode, ToolShape};
-use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
+
+use crate::start;
 
 type V = Vector3<f64>;
 
@@ -42,7 +41,7 @@ fn sheet() -> Simulation {
         sweep_m = [[[-0.01, 0.0005, 0.06], [0.01, 0.0005, 0.06]], [[-0.01, 0.0005, 0.03], [0.01, 0.0005, 0.03]]]
         "#
     );
-    Simulation::new(&Scene::from_toml(&text).unwrap(), Path::new("")).unwrap()
+    start(&text)
 }
 
 /// The page's hand: the blade lies along the line of sight and follows the skin under the cursor.
@@ -92,16 +91,11 @@ impl Mouse {
         self.seq += 1;
         let (last, passed) = poses.split_last().unwrap();
         ToolInput {
-            id: "blade".into(),
-            owner: "page".into(),
-            pose: *last,
             passed: passed.to_vec(),
-            velocity_m_s: V::zeros(),
             mode,
-            closed: None,
             shape: Some(ToolShape::Blade { length_m: 0.0425, thickness_m: 0.0002 }),
             seq: self.seq,
-            client_time_ns: 0,
+            ..ToolInput::new("blade", "page", *last)
         }
     }
 }

@@ -1,14 +1,13 @@
 //! Bodies on bodies and bodies on themselves.
 
-use std::path::Path;
-
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
 use scindo_physics::body::Outcome;
-use scindo_world::assemble::BuildOptions;
+use scindo_tests::scene;
 use scindo_world::inputs::Inputs;
-use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
+
+use crate::start_with;
 
 const WORLD: &str = r#"
     schema = 1
@@ -24,21 +23,9 @@ const WORLD: &str = r#"
 
 /// A block of 6 cm whose lowest corner is at these coordinates [m].
 fn block(id: &str, at: [f64; 3], lines: &str) -> String {
-    let [x, y, z] = at;
-    let (u, v, w) = (x + 0.06, y + 0.06, z + 0.06);
     let cells = if lines.contains("octree") { 6 } else { 3 };
-    format!(
-        r#"
-        [[body]]
-        id = "{id}"
-        mesh = {{ box = {{ min_m = [{x}, {y}, {z}], max_m = [{u}, {v}, {w}], cells = [{cells}, {cells}, {cells}] }} }}
-        young_pa = 2e4
-        poisson = 0.4
-        density_kg_m3 = 1000
-        rayleigh = {{ stiffness_s = 0.005 }}
-        {lines}
-    "#
-    )
+    let keys = format!("rayleigh = {{ stiffness_s = 0.005 }}\n{lines}");
+    scene::block(id, [at, at.map(|x| x + 0.06)], [cells; 3], &keys)
 }
 
 /// A block that is cut through across and touches itself.
@@ -46,16 +33,11 @@ fn split(lines: &str) -> String {
     WORLD.replace("body_collision", "self_collision")
         + lines
         + &block("split", [0.0, 0.0, 0.0], "")
-        + r#"
-        [[cut]]
-        body = "split"
-        sweep_m = [[[-0.01, -0.01, 0.031], [0.07, -0.01, 0.031]], [[-0.01, 0.07, 0.031], [0.07, 0.07, 0.031]]]
-    "#
-}
-
-fn start(text: &str, threads: usize) -> Simulation {
-    let scene = Scene::from_toml(text).unwrap();
-    Simulation::with_options(&scene, Path::new(""), BuildOptions { threads, portable: false }).unwrap()
+        + &scene::cut(
+            "split",
+            0.0,
+            [[[-0.01, -0.01, 0.031], [0.07, -0.01, 0.031]], [[-0.01, 0.07, 0.031], [0.07, 0.07, 0.031]]],
+        )
 }
 
 /// Steps; every body advances and nothing sinks in by more than `depth` cells.
@@ -92,7 +74,7 @@ fn three_blocks_fall_on_each_other_and_stay_where_they_are() {
     .concat();
     // A column of softer jelly buckles under its own weight.
     let text = text.replace("young_pa = 2e4", "young_pa = 1e5");
-    let mut sim = start(&text, 1);
+    let mut sim = start_with(&text, 1);
     steps(&mut sim, 600, 0.1);
     assert!(kinetic(&sim) < 1e-8, "{}", kinetic(&sim));
     let before = [0, 1, 2].map(|body| centre(&sim, body));
@@ -111,7 +93,7 @@ fn two_bodies_exchange_momentum_exactly() {
     for lines in ["", "element = \"octree\""] {
         let thrown = block("a", [0.0, 0.0, 0.2], "velocity_m_s = [1, 0, 0]");
         let text = format!("{still}{thrown}{}", block("b", [0.075, 0.02, 0.21], lines));
-        let mut sim = start(&text, 1);
+        let mut sim = start_with(&text, 1);
         let total = |sim: &Simulation| sim.bodies().iter().map(|b| b.body.momentum()).sum::<Vector3<f64>>();
         let (start, alone) = (total(&sim), sim.bodies()[0].body.momentum());
         let mut deepest = 0.0f64;
@@ -131,7 +113,7 @@ fn two_bodies_exchange_momentum_exactly() {
 fn the_lips_of_a_cut_neither_stick_nor_pass_through_each_other() {
     // A block on its side is cut through and pressed together by its own weight, then pulled open.
     let text = split("");
-    let mut sim = start(&text, 1);
+    let mut sim = start_with(&text, 1);
     steps(&mut sim, 300, 0.1);
     let report = *sim.touch_reports().first().unwrap();
     assert!(report.bodies == [0, 0] && report.contacts > 0);
@@ -143,7 +125,7 @@ fn the_lips_of_a_cut_neither_stick_nor_pass_through_each_other() {
     let apart = (centres[0].z - centres[1].z).abs();
     assert!((0.028..0.032).contains(&apart), "{apart}");
     // Without it, the upper half falls through.
-    let mut free = start(&text.replace("self_collision = true", "self_collision = false"), 1);
+    let mut free = start_with(&text.replace("self_collision = true", "self_collision = false"), 1);
     for _ in 0..300 {
         free.step(&Inputs::default());
     }
@@ -154,7 +136,7 @@ fn the_lips_of_a_cut_neither_stick_nor_pass_through_each_other() {
 #[test]
 fn a_multiplier_joins_springs_that_are_too_soft() {
     // The upper half of a block presses the springs between the lips down to 7 % of a cell.
-    let mut sim = start(&split("[world.contact]\nstiffness = 0.2\n"), 1);
+    let mut sim = start_with(&split("[world.contact]\nstiffness = 0.2\n"), 1);
     steps(&mut sim, 300, 0.15);
     steps(&mut sim, 300, 0.022);
     let weight = 0.5 * 9.81 * sim.bodies()[0].body.total_mass();
@@ -173,7 +155,7 @@ fn threads_change_no_bit_and_a_steady_step_allocates_nothing() {
         &block("high", [0.01, 0.005, 0.063], "element = \"octree\""),
     ]
     .concat();
-    let mut sims = [1, 2, 3].map(|threads| start(&text, threads));
+    let mut sims = [1, 2, 3].map(|threads| start_with(&text, threads));
     sims.iter_mut().for_each(|sim| steps(sim, 60, 0.2));
     for sim in &sims[1..] {
         for (one, other) in sims[0].bodies().iter().zip(sim.bodies()) {
@@ -195,8 +177,8 @@ fn threads_change_no_bit_and_a_steady_step_allocates_nothing() {
 fn bodies_that_are_apart_step_as_if_the_effect_were_off() {
     let blocks = [block("low", [0.0, 0.0, 0.3], ""), block("high", [0.2, 0.0, 0.3], "")].concat();
     let on = WORLD.replace("body_collision = true", "body_collision = true\nself_collision = true");
-    let [mut on, mut off] =
-        [&on, &WORLD.replace("body_collision = true", "")].map(|world| start(&format!("{world}{blocks}"), 1));
+    let [mut on, mut off] = [&on, &WORLD.replace("body_collision = true", "")]
+        .map(|world| start_with(&format!("{world}{blocks}"), 1));
     for sim in [&mut on, &mut off] {
         steps(sim, 15, 0.0);
     }
@@ -226,7 +208,7 @@ fn every_broad_phase_gives_the_same_motion() {
             at_s = 0.1
             sweep_m = [[[0.055, -0.01, 0.15], [0.055, 0.07, 0.15]], [[0.055, -0.01, 0.08], [0.055, 0.07, 0.08]]]
         "#;
-        let mut sim = start(&text, 1);
+        let mut sim = start_with(&text, 1);
         let mut bits = Vec::new();
         for round in 0..2 {
             (0..25).for_each(|_| drop(sim.step(&Inputs::default()).clone()));

@@ -1,12 +1,13 @@
 //! Cuts that are taken back: the surface of before, the momentum of now, and no more than was cut.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use scindo_tests::scene;
 use scindo_world::inputs::{CutRequest, Inputs};
-use scindo_world::scene::Scene;
 use scindo_world::simulation::{MAX_UNDO, Simulation};
+
+use crate::{run, start};
 
 /// A block that flies and turns, so that there is momentum to be kept.
 fn block(how: &str) -> Simulation {
@@ -14,12 +15,12 @@ fn block(how: &str) -> Simulation {
 }
 
 fn block_with(how: &str, world: &str, more: &str) -> Simulation {
-    let text = format!(
-        "schema = 1\n{world}step_s = 0.01\n[[body]]\nid = \"block\"\n{how}\nyoung_pa = 1e4\npoisson = 0.3\n\
-         density_kg_m3 = 1000\nsolver = {{ tolerance = 1e-5 }}\nrayleigh = {{ stiffness_s = 0.01 }}\n\
-         mesh = {{ box = {{ min_m = [0, 0, 0], max_m = [0.08, 0.04, 0.04], cells = [8, 4, 4] }} }}\n{more}"
+    let keys = format!(
+        "{how}\nyoung_pa = 1e4\npoisson = 0.3\nsolver = {{ tolerance = 1e-5 }}\n\
+         rayleigh = {{ stiffness_s = 0.01 }}\n{more}"
     );
-    Simulation::new(&Scene::from_toml(&text).unwrap(), Path::new("")).unwrap()
+    let block = scene::block("block", [[0.0; 3], [0.08, 0.04, 0.04]], [8, 4, 4], &keys);
+    start(&format!("schema = 1\n{world}step_s = 0.01\n{block}"))
 }
 
 const SNAP: &str = "cutting = { method = \"snap\" }";
@@ -28,12 +29,6 @@ const PUSHED: &str =
     "load = [{ where = { slab = { axis = \"x\", from = 1, to = 1 } }, force_n = [0, 0, 0.02] }]";
 const GENERAL: &str = "law = \"neo-hookean\"";
 const QUADRATIC: &str = "element = \"tet10\"";
-
-fn steps(sim: &mut Simulation, n: usize) {
-    for _ in 0..n {
-        sim.step(&Inputs::default());
-    }
-}
 
 /// Half through the block at `x`, where it is now.
 fn cut(sim: &mut Simulation, number: u64, x: f64) {
@@ -64,15 +59,15 @@ fn a_cut_that_is_taken_back_leaves_the_surface_the_mass_and_the_momentum() {
     for how in ["", "skin = { divisions = 2 }", SNAP, GENERAL, QUADRATIC] {
         // Pushed at one end, it flies and turns.
         let mut sim = block(&format!("{how}\n{PUSHED}"));
-        steps(&mut sim, 10);
+        run(&mut sim, 10);
         let (whole, epoch, mass) =
             (surface(&sim), sim.bodies()[0].epoch(), sim.bodies()[0].body.total_mass());
         cut(&mut sim, 1, 0.0337);
-        steps(&mut sim, 15);
+        run(&mut sim, 15);
         let once = surface(&sim);
         assert_ne!(once, whole, "{how}");
         cut(&mut sim, 2, 0.0552);
-        steps(&mut sim, 5);
+        run(&mut sim, 5);
         let body = &sim.bodies()[0].body;
         let (p, c) = (body.momentum(), body.centre_of_mass());
         assert!(p.norm() > 1e-3 && body.angular_momentum().norm() > 1e-4, "{how}: {p}");
@@ -86,7 +81,7 @@ fn a_cut_that_is_taken_back_leaves_the_surface_the_mass_and_the_momentum() {
         }
         assert!(sim.bodies()[0].epoch() > epoch + 2, "{how}");
         assert!(sim.undo().unwrap_err().contains("no cut to undo"));
-        steps(&mut sim, 40);
+        run(&mut sim, 40);
         let body = &sim.bodies()[0].body;
         assert!(body.least_volume_ratio() > 0.5, "{how}: {}", body.least_volume_ratio());
         cut(&mut sim, 3, 0.0337);
@@ -131,18 +126,18 @@ fn a_part_that_was_cut_off_and_fell_comes_back() {
         let held = "[world]\ngravity_m_s2 = [0, 0, -9.81]\n";
         let fix = "[[body.fix]]\nwhere = { slab = { axis = \"x\", from = 0, to = 0 } }\n";
         let mut sim = block_with(how, held, fix);
-        steps(&mut sim, 20);
+        run(&mut sim, 20);
         let whole = surface(&sim);
         let at = |y: f64| [Vector3::new(0.0552, y, -0.05), Vector3::new(0.0552, y, 0.09)];
         let segments = vec![at(-0.02), at(0.06)];
         let cut = CutRequest { request: 1, tool: Arc::from("t"), body: None, segments };
         sim.step(&Inputs { cuts: vec![cut], ..Inputs::default() });
         assert_eq!(sim.bodies()[0].body.parts().len(), 2, "{how}");
-        steps(&mut sim, 60);
+        run(&mut sim, 60);
         let fallen = sim.bodies()[0].body.positions().iter().map(|x| x.z).fold(0.0, f64::min);
         assert!(fallen < -0.5, "{how}: {fallen}");
         sim.undo().unwrap();
-        steps(&mut sim, 1);
+        run(&mut sim, 1);
         assert_eq!(surface(&sim), whole);
         let rest = sim.bodies()[0].body.rest_positions().to_vec();
         let sag = |sim: &Simulation| furthest(sim.bodies()[0].body.positions(), &rest);
@@ -152,11 +147,11 @@ fn a_part_that_was_cut_off_and_fell_comes_back() {
         let mut uncut = block_with(how, held, fix);
         let mut swings: f64 = 0.0;
         for _ in 0..182 {
-            steps(&mut uncut, 1);
+            run(&mut uncut, 1);
             swings = swings.max(sag(&uncut));
         }
         assert!(back <= swings, "{how}: {back} m from its rest shape, and never more than {swings} m uncut");
-        steps(&mut sim, 100);
+        run(&mut sim, 100);
         let hangs = sag(&uncut);
         let off = furthest(sim.bodies()[0].body.positions(), uncut.bodies()[0].body.positions());
         assert!(

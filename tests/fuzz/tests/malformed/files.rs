@@ -11,6 +11,7 @@ use scindo::record::reader::Recording;
 use scindo::record::recorder::RecordSettings;
 use scindo::sim::engine::Engine;
 use scindo_fuzz::attack;
+use scindo_tests::scene::{WORLD, block, held};
 use scindo_world::body::texture::{Atlas, Image, Mapping, Texture};
 use scindo_world::format::{MeshFile, read_mesh_bytes, read_textured_bytes};
 use scindo_world::inputs::Inputs;
@@ -152,24 +153,12 @@ fn vtu() {
     attack!(vec![text.as_bytes().to_vec()], RECIPES, read("a.vtu"));
 }
 
-const SCENE: &str = r#"
-schema = 1
-name = "recorded"
-world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
-[[body]]
-id = "block"
-mesh = { box = { min_m = [0, 0, 0], max_m = [0.2, 0.1, 0.1], cells = [2, 1, 1] } }
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
-"#;
-
 /// A recording of four steps with one checkpoint, that of its beginning. Checkpoints follow the clock, so a busy machine
 /// would write more of them if the next one were due within the test.
 fn recorded(folder: &Path) -> Vec<u8> {
     let file = folder.join("seed.mcap");
-    let scene = Scene::from_toml(SCENE).unwrap();
+    let block = block("block", [[0.0; 3], [0.2, 0.1, 0.1]], [2, 1, 1], &held("z"));
+    let scene = Scene::from_toml(&(WORLD.to_owned() + &block)).unwrap();
     let mut engine = Engine::new(Simulation::new(&scene, Path::new("")).unwrap(), None).unwrap();
     let checkpoint = Duration::from_secs(3600);
     let settings =
