@@ -166,28 +166,3 @@ fn no_crate_has_more_modules_than_a_reader_can_hold() {
     assert!(seen >= 9, "only {seen} crates were found");
     assert!(wrong.is_empty(), "{}", wrong.join("; "));
 }
-
-/// `lib.rs` presents the rooms of the world in the order of the data, and each knows only those before it.
-#[test]
-fn the_rooms_of_the_world_form_a_stair() {
-    let world = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/world/src");
-    let face = std::fs::read_to_string(world.join("lib.rs")).expect("readable");
-    let rooms: Vec<&str> =
-        face.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
-    assert!((8..=14).contains(&rooms.len()), "{rooms:?}");
-    let mut wrong = Vec::new();
-    for (number, room) in rooms.iter().enumerate() {
-        let mut open = vec![world.join(room), world.join(format!("{room}.rs"))];
-        while let Some(path) = open.pop() {
-            if path.is_dir() {
-                open.extend(std::fs::read_dir(&path).expect("readable").map(|e| e.expect("entry").path()));
-            } else if path.exists() {
-                let text = std::fs::read_to_string(&path).expect("readable");
-                let knows = |later: &&&str| text.contains(&format!("crate::{later}::"));
-                let later = rooms[number + 1..].iter().filter(knows);
-                wrong.extend(later.map(|later| format!("{} knows {later}", path.display())));
-            }
-        }
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}

@@ -4,4 +4,6 @@
 
 mod architecture;
 mod circles;
+mod imports;
 mod links;
+mod stairs;
