@@ -261,6 +261,7 @@ fn session_info() -> impl Strategy<Value = SessionInfo> {
         up: Some(Vec3 { x: 0.0, y: 1.0, z: 0.0 }),
         obstacles,
         records: true,
+        scene_description: "A kidney is cut.".into(),
     })
 }
 

@@ -51,6 +51,8 @@ class Mistakes(unittest.TestCase):
         (lambda d: d["body"][0].pop("id"), "body[0]", "'id' is missing"),
         (lambda d: d["world"].update(step_s=0.0), "world.step_s", "more than 0"),
         (lambda d: d.update(schema=2), "schema", "at most 1"),
+        (lambda d: d.update(description=""), "description", "200"),
+        (lambda d: d.update(description="two lines\n"), "description", "one plain sentence"),
         (lambda d: d.update(wrold={}), "", "world"),
         (lambda d: d["tool"][0].update(shape={"cube": {}}), "tool[0].shape", "cube"),
         (lambda d: d.update(cut=[{"body": "block", "path_m": [[0, 0, 0], [1, 0, 0]]}]), "cut[0]", "exactly one"),

@@ -35,6 +35,7 @@ impl WireMessage for SessionInfo {
         let at = In(Self::NAME);
         at.text("server_version", &self.server_version)?;
         at.text("scene_name", &self.scene_name)?;
+        at.text("scene_description", &self.scene_description)?;
         at.text("scene", &self.scene)?;
         at.positive("step_s", self.step_s, f64::MAX)?;
         for body in &self.bodies {

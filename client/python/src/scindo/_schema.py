@@ -133,8 +133,10 @@ def _check_text(value: str, part: Schema, path: str) -> None:
             f"{value!r} has {len(value)} characters",
             hint=f"Use {part.get('minLength', 0)} to {most}" if most else "Write a text",
         )
-    if "pattern" in part and not re.search(part["pattern"], value):
-        raise SceneError(path, f"{value!r} does not match {part['pattern']}", hint="Names consist of a-z, 0-9, _ and -")
+    # All patterns stand between ^ and $, which alone would let a line end pass.
+    if "pattern" in part and not re.fullmatch(part["pattern"], value):
+        hint = _hint(part) if "x-next" in part else "Names consist of a-z, 0-9, _ and -"
+        raise SceneError(path, f"{value!r} does not match {part['pattern']}", hint=hint)
 
 
 def _check_number(value: float, part: Schema, path: str) -> None:

@@ -54,6 +54,8 @@ class SessionInfo:
     obstacles: Tuple[str, ...]
     #: Unit vector against gravity.
     up: Array
+    #: What the scene shows, in one sentence; empty if it does not say.
+    description: str
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,8 @@ def to_info(m: server_pb2.SessionInfo) -> SessionInfo:
     tools = tuple(ToolInfo(t.id, t.owner, t.cuts) for t in m.tools)
     obstacles = tuple(o.id for o in m.obstacles)
     up = from_vec3(m.up) if m.HasField("up") else np.array([0.0, 0.0, 1.0])
-    return SessionInfo(m.server_version, m.scene_name, m.step_s, m.scene_seq, bodies, tools, obstacles, up)
+    of_the_scene = (m.scene_name, m.step_s, m.scene_seq, bodies, tools, obstacles, up, m.scene_description)
+    return SessionInfo(m.server_version, *of_the_scene)
 
 
 def to_params(m: server_pb2.ParamsReply) -> Dict[str, Param]:

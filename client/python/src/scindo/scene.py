@@ -33,9 +33,16 @@ class Scene:
     """
 
     def __init__(
-        self, name: str = "unnamed", *, gravity: Optional[Vector] = None, step_s: Optional[float] = None
+        self,
+        name: str = "unnamed",
+        *,
+        description: Optional[str] = None,
+        gravity: Optional[Vector] = None,
+        step_s: Optional[float] = None,
     ) -> None:
         self._data: Dict[str, Any] = {"schema": 1, "name": name}
+        if description is not None:
+            self._data["description"] = description
         world: Dict[str, Any] = {}
         if gravity is not None:
             world["gravity_m_s2"] = _plain(gravity)

@@ -45,6 +45,7 @@ export class Panel {
 
   showInfo(info: SessionInfo): void {
     this.at("scene").textContent = info.sceneName;
+    this.at("scene").title = info.sceneDescription;
     document.title = info.sceneName ? `${info.sceneName} · scindo` : "scindo";
   }
 

@@ -20,6 +20,8 @@ const NAMES: Record<string, string> = {
 export class Params {
   private readonly box = document.getElementById("params")!;
   private readonly scenes = element("div", "line");
+  /** What the running scene shows. */
+  private readonly about = element("p", "muted");
   private readonly list = element("div", "sliders");
   private scene = "";
   private timer = 0;
@@ -27,7 +29,7 @@ export class Params {
   private readonly waiting = new Map<string, string>();
 
   constructor(private readonly relay: Relay, private readonly session: Session) {
-    this.box.append(this.scenes, this.list);
+    this.box.append(this.scenes, this.about, this.list);
   }
 
   /** Called when the tray is opened or another scene runs. */
@@ -56,11 +58,11 @@ export class Params {
     }
     select.value = this.scene;
     select.id = "scene-choice";
-    select.title = scenes.find((scene) => scene.name === this.scene)?.description ?? "";
     select.onchange = () => {
       this.relay.call({ case: "load", value: { name: select.value } });
       select.blur();
     };
+    this.about.textContent = scenes.find((scene) => scene.name === this.scene)?.description ?? "";
     this.scenes.replaceChildren(element("h2", "", "Scene"), select);
   }
 

@@ -64,6 +64,7 @@ fn end_s(args: &CheckArgs, step_s: f64) -> Result<Option<f64>, RuntimeError> {
 struct Found {
     file: String,
     name: String,
+    description: String,
     step_s: f64,
     bodies: Vec<(String, Value)>,
     plan: Plan,
@@ -78,6 +79,7 @@ impl Found {
         Self {
             file: scene.file().to_owned(),
             name: scene.name().to_owned(),
+            description: scene.description().to_owned(),
             step_s: simulation.step_s(),
             bodies: simulation.bodies().iter().map(|body| (in_words(body), body_as_json(body))).collect(),
             plan: simulation.plan(),
@@ -127,6 +129,7 @@ impl Found {
     fn as_json(&self) -> Value {
         json!({
             "scene": self.name,
+            "description": self.description,
             "step_s": self.step_s,
             "predicted_ms": self.predicted_ms(),
             "effects": self.plan.effects,
@@ -144,6 +147,9 @@ impl Found {
 
     fn print(&self) {
         say!("{}: {}", self.file, self.name);
+        if !self.description.is_empty() {
+            say!("  {}", self.description);
+        }
         for (words, _) in &self.bodies {
             say!("{words}");
         }

@@ -181,6 +181,7 @@ impl Engine {
             server_version: env!("CARGO_PKG_VERSION").to_owned(),
             wire_version: WIRE_VERSION,
             scene_name: scene.name.clone(),
+            scene_description: scene.description.clone(),
             step_s: scene.step_s,
             bodies: self.sim.bodies().iter().zip(&scene.bodies).map(body_info).collect(),
             tools: tools.collect(),

@@ -78,6 +78,7 @@ impl Check<'_> {
         self.touch(&bodies);
         CheckedScene {
             name: raw.name.clone(),
+            description: raw.description.clone().unwrap_or_default(),
             seed: raw.seed,
             gravity_m_s2: Vector3::from(raw.world.gravity_m_s2),
             step_s: raw.world.step_s,

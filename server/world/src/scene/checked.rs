@@ -15,6 +15,8 @@ use crate::mesh_in::Organ;
 pub struct CheckedScene {
     /// What the scene is called.
     pub name: String,
+    /// What it shows, in one sentence; empty if the file does not say.
+    pub description: String,
     /// Seed of everything random.
     pub seed: u64,
     /// Acceleration of free fall [m/s²].

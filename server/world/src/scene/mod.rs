@@ -173,6 +173,11 @@ impl Scene {
         &self.checked.name
     }
 
+    /// What the scene shows, in one sentence; empty if it does not say.
+    pub fn description(&self) -> &str {
+        &self.checked.description
+    }
+
     /// The file it came from.
     pub fn file(&self) -> &str {
         &self.file

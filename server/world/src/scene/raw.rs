@@ -50,6 +50,12 @@ pub struct RawScene {
     /// Name of the scene in results and clients.
     #[serde(default = "unnamed")]
     pub name: String,
+    /// What the scene shows, in one sentence of at most 200 characters. Lists of scenes, `scindo check` and
+    /// clients show it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(regex(pattern = r"^[^\r\n]+$"), length(min = 1, max = 200),
+        extend("x-next" = "write one plain sentence"))]
+    pub description: Option<String>,
     /// Seed of random numbers. The results record it.
     #[serde(default)]
     pub seed: u64,

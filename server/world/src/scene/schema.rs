@@ -24,6 +24,9 @@ pub fn key_reference() -> String {
     rows
 }
 
+/// The pattern of text in one line. All other patterns are those of names.
+const ONE_LINE: &str = r"^[^\r\n]+$";
+
 /// A fault and the key path it was found at.
 pub(crate) type Finding = (String, Fault);
 
@@ -148,15 +151,18 @@ impl<'a> Walk<'a> {
         let least = schema["minLength"].as_u64().unwrap_or(0);
         let most = schema["maxLength"].as_u64().unwrap_or(u64::MAX);
         let length = text.chars().count() as u64;
-        let plain = schema["pattern"].is_null()
-            || text.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_');
-        if length < least || length > most || !plain {
-            let allowed = if schema["pattern"].is_null() {
-                "text that is not empty".to_owned()
-            } else {
-                format!("{least} to {most} characters out of a-z, 0-9, - and _")
+        // Text of a closed form is one line or a name.
+        let (fits, form) = match schema["pattern"].as_str() {
+            None => (true, None),
+            Some(ONE_LINE) => (!text.contains(['\r', '\n']), Some("in one line")),
+            Some(_) => (text.chars().all(is_of_names), Some("out of a-z, 0-9, - and _")),
+        };
+        if length < least || length > most || !fits {
+            let allowed = match form {
+                None => "text that is not empty".to_owned(),
+                Some(form) => format!("{least} to {most} characters {form}"),
             };
-            let next = "rename it".to_owned();
+            let next = next_step(schema, schema, "rename it");
             self.report(path, Fault::OutOfRange { found: node.shown(), allowed, next });
         }
     }
@@ -225,6 +231,11 @@ fn next_step(outer: &Value, schema: &Value, otherwise: &str) -> String {
 
 fn join(path: &str, key: &str) -> String {
     if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+}
+
+/// Whether a name of a body, tool or probe may contain it.
+fn is_of_names(c: char) -> bool {
+    c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_'
 }
 
 /// Follows `$ref` and the optional wrapper `anyOf: [T, null]`.

@@ -83,6 +83,13 @@ fn values_out_of_range_name_range_and_next_step() {
         ("[2, 4, 12]", "[1000, 1000, 1000]", &["1000000000 cells", "at most"]),
         ("max_m = [0.03,", "max_m = [-0.03,", &["max_m lies below min_m along x"]),
         ("schema = 1", "schema = 2", &["scene:2: schema: found 2", "schema = 1"]),
+        (
+            "name = \"beam\"",
+            "description = \"\"",
+            &["scene:3: description: found", "1 to 200 characters in one line", "one plain sentence"],
+        ),
+        ("name = \"beam\"", "description = \"two\\nlines\"", &["scene:3: description", "in one line"]),
+        ("name = \"beam\"", "description = 3", &["description: expected text, found 3"]),
         ("length_m = 0.04", "length_m = 0", &["tool.scalpel.shape.blade.length_m", "above 0"]),
         ("side = [0, 0, 1]", "side = [0, 0, 0]", &["probe.lip.side", "zero length"]),
         ("id = \"beam\"\nmesh", "id = \"Beam 1\"\nmesh", &["a-z, 0-9"]),
@@ -93,6 +100,8 @@ fn values_out_of_range_name_range_and_next_step() {
     for (find, replace, parts) in cases {
         assert_says(&message_after(find, replace), parts);
     }
+    let long = format!("description = \"{}\"", "x".repeat(201));
+    assert_says(&message_after("name = \"beam\"", &long), &["1 to 200 characters in one line"]);
 }
 
 #[test]

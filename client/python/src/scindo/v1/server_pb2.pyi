@@ -10,7 +10,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class SessionInfo(_message.Message):
-    __slots__ = ("server_version", "wire_version", "scene_name", "step_s", "bodies", "tools", "scene_seq", "scene", "up", "obstacles", "records")
+    __slots__ = ("server_version", "wire_version", "scene_name", "step_s", "bodies", "tools", "scene_seq", "scene", "up", "obstacles", "records", "scene_description")
     SERVER_VERSION_FIELD_NUMBER: _ClassVar[int]
     WIRE_VERSION_FIELD_NUMBER: _ClassVar[int]
     SCENE_NAME_FIELD_NUMBER: _ClassVar[int]
@@ -22,6 +22,7 @@ class SessionInfo(_message.Message):
     UP_FIELD_NUMBER: _ClassVar[int]
     OBSTACLES_FIELD_NUMBER: _ClassVar[int]
     RECORDS_FIELD_NUMBER: _ClassVar[int]
+    SCENE_DESCRIPTION_FIELD_NUMBER: _ClassVar[int]
     server_version: str
     wire_version: int
     scene_name: str
@@ -33,7 +34,8 @@ class SessionInfo(_message.Message):
     up: _common_pb2.Vec3
     obstacles: _containers.RepeatedCompositeFieldContainer[ObstacleInfo]
     records: bool
-    def __init__(self, server_version: _Optional[str] = ..., wire_version: _Optional[int] = ..., scene_name: _Optional[str] = ..., step_s: _Optional[float] = ..., bodies: _Optional[_Iterable[_Union[BodyInfo, _Mapping[str, object]]]] = ..., tools: _Optional[_Iterable[_Union[ToolInfo, _Mapping[str, object]]]] = ..., scene_seq: _Optional[int] = ..., scene: _Optional[str] = ..., up: _Optional[_Union[_common_pb2.Vec3, _Mapping[str, object]]] = ..., obstacles: _Optional[_Iterable[_Union[ObstacleInfo, _Mapping[str, object]]]] = ..., records: _Optional[bool] = ...) -> None: ...
+    scene_description: str
+    def __init__(self, server_version: _Optional[str] = ..., wire_version: _Optional[int] = ..., scene_name: _Optional[str] = ..., step_s: _Optional[float] = ..., bodies: _Optional[_Iterable[_Union[BodyInfo, _Mapping[str, object]]]] = ..., tools: _Optional[_Iterable[_Union[ToolInfo, _Mapping[str, object]]]] = ..., scene_seq: _Optional[int] = ..., scene: _Optional[str] = ..., up: _Optional[_Union[_common_pb2.Vec3, _Mapping[str, object]]] = ..., obstacles: _Optional[_Iterable[_Union[ObstacleInfo, _Mapping[str, object]]]] = ..., records: _Optional[bool] = ..., scene_description: _Optional[str] = ...) -> None: ...
 
 class ObstacleInfo(_message.Message):
     __slots__ = ("id", "half_space", "box", "capsule", "surface")
