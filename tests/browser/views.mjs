@@ -311,8 +311,9 @@ async function takesACutBack(page) {
 
 async function changesTheScene(page) {
   const choice = page.locator("#scene-choice");
-  hold((await choice.inputValue()) === "views" && (await choice.locator("option").count()) > 5, "the scene that runs is chosen among those that ship");
+  hold((await choice.inputValue()) === "views" && (await choice.locator("option").count()) > 30, "the scene that runs is chosen among those that ship");
   await choice.selectOption("kidney");
+  await until(page, "the menu says what the scene shows", MINUTE, () => /kidney/.test(document.querySelector("#params > p").textContent));
   await until(page, "another scene is drawn", MINUTE, () => window.scindo.bodies().length === 1 && window.scindo.bodies()[0].id === "kidney" && window.scindo.bodies()[0].vertices > 0);
   await until(page, "the page is live again", MINUTE, () => document.getElementById("link").dataset.state === "live");
   await picture(page, "views-10-kidney.png");

@@ -48,11 +48,11 @@ pub fn demonstration(args: &ServeArgs) -> Result<ExitCode, RuntimeError> {
 pub fn demo(args: &DemoArgs) -> Result<ExitCode, RuntimeError> {
     if args.list {
         if args.serve.json {
-            let list = SHIPPED.map(|scene| json!({ "name": scene.name, "description": scene.description }));
+            let list = SHIPPED.map(|scene| json!({ "name": scene.name, "description": scene.description() }));
             say!("{:#}", json!({ "scenes": list }));
         } else {
             let width = SHIPPED.iter().map(|scene| scene.name.len()).max().unwrap_or(0);
-            SHIPPED.iter().for_each(|scene| say!("{:width$}  {}", scene.name, scene.description));
+            SHIPPED.iter().for_each(|scene| say!("{:width$}  {}", scene.name, scene.description()));
         }
         return Ok(ExitCode::SUCCESS);
     }

@@ -39,7 +39,7 @@ impl Catalogue {
     pub fn beside(name: &str, own: &Scene) -> Self {
         let listed = |scene: ShippedScene| Listed {
             name: scene.name.to_owned(),
-            description: scene.description.to_owned(),
+            description: scene.description(),
             source: Source::Shipped(scene),
         };
         let mut scenes: Vec<Listed> = SHIPPED.into_iter().map(listed).collect();
@@ -47,7 +47,10 @@ impl Catalogue {
         match scenes.iter_mut().find(|scene| scene.name == name) {
             Some(scene) => scene.source = source,
             None => {
-                let description = "the scene that the server was started with".to_owned();
+                let description = match own.description() {
+                    "" => "the scene that the server was started with".to_owned(),
+                    described => described.to_owned(),
+                };
                 scenes.insert(0, Listed { name: name.to_owned(), description, source });
             }
         }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::mesh::fault;
 use crate::body::texture::{Atlas, Image, Mapping, Texture};
-use crate::format::read_textured;
+use crate::format::{inside, read_textured};
 use crate::scene::{Fault, MeshSource, TextureMapping, TextureSpec};
 
 /// Largest file of an image [bytes].
@@ -26,20 +26,8 @@ pub fn load(
 }
 
 fn image(path: &Path) -> Result<Image, Fault> {
-    let refused = |reason: String, next: &str| Fault::File {
-        path: path.display().to_string(),
-        reason,
-        next: next.to_owned(),
-    };
-    let unreadable =
-        |error: std::io::Error| refused(error.to_string(), "check the path, which is relative to the scene");
-    let length = std::fs::metadata(path).map_err(unreadable)?.len();
-    if length > MAX_BYTES {
-        let found =
-            format!("it has {} MiB, and an image may have {}", length.div_ceil(1 << 20), MAX_BYTES >> 20);
-        return Err(refused(found, "save it smaller, or as JPEG"));
-    }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let refused = |reason: String, next: &str| refused(path, reason, next);
+    let bytes = bytes(path)?;
     let media_type = match imagesize::image_type(&bytes) {
         Ok(imagesize::ImageType::Png) => "image/png",
         Ok(imagesize::ImageType::Jpeg) => "image/jpeg",
@@ -53,6 +41,27 @@ fn image(path: &Path) -> Result<Image, Fault> {
         return Err(refused(found, "save it smaller"));
     }
     Ok(Image { media_type, bytes: bytes.into() })
+}
+
+/// The bytes of an image file of at most [`MAX_BYTES`].
+fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
+    if let Some(bytes) = inside(path) {
+        return Ok(bytes.to_vec());
+    }
+    let unreadable = |error: std::io::Error| {
+        refused(path, error.to_string(), "check the path, which is relative to the scene")
+    };
+    let length = std::fs::metadata(path).map_err(unreadable)?.len();
+    if length > MAX_BYTES {
+        let found =
+            format!("it has {} MiB, and an image may have {}", length.div_ceil(1 << 20), MAX_BYTES >> 20);
+        return Err(refused(path, found, "save it smaller, or as JPEG"));
+    }
+    std::fs::read(path).map_err(unreadable)
+}
+
+fn refused(path: &Path, reason: String, next: &str) -> Fault {
+    Fault::File { path: path.display().to_string(), reason, next: next.to_owned() }
 }
 
 fn mapping(

@@ -2,11 +2,12 @@
 //!
 //! A file holds either a *volume* (tetrahedra: `.msh`, `.vtk`, `.vtu`) or a *surface* (triangles: `.obj`,
 //! `.stl`, `.ply`, and `.vtk`, `.vtu`, `.vtp`, `.msh` without tetrahedra). Readers work on bytes in memory;
-//! only [`read_mesh`] opens files. Before it allocates, every reader checks counts against the bytes that are
+//! only [`read_mesh`] and [`read_textured`] open files. Before it allocates, every reader checks counts against the bytes that are
 //! there. Before it returns, it checks indices against the nodes. Errors name the file, the place and what
 //! was expected.
 
 mod error;
+mod inside;
 mod groups;
 mod mesh_file;
 mod scanner;
@@ -28,6 +29,7 @@ use nalgebra::Vector3;
 
 pub use error::MeshInError;
 pub use groups::{CellGroup, GMSH_PHYSICAL, keep_tets};
+pub(crate) use inside::{inside, with_files_inside};
 pub use mesh_file::{MeshFile, SurfaceMesh, TexturedSurface, VolumeMesh};
 pub use obj::{read_textured, read_textured_bytes};
 
@@ -40,6 +42,9 @@ pub fn read_mesh(path: &Path) -> Result<MeshFile, MeshInError> {
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, MeshInError> {
+    if let Some(bytes) = inside(path) {
+        return Ok(bytes.to_vec());
+    }
     let io = |source| MeshInError::Io { path: path.to_path_buf(), source };
     let file = path.display().to_string();
     let length = std::fs::metadata(path).map_err(io)?.len();

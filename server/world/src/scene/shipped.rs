@@ -1,7 +1,8 @@
 //! The scenes that come with the program, built into it.
 
-use super::source::Node;
+use super::source::{Kind, Node};
 use super::{Scene, SceneError, problem};
+use crate::format::with_files_inside;
 use std::path::PathBuf;
 
 /// A scene that comes with the program.
@@ -9,33 +10,51 @@ use std::path::PathBuf;
 pub struct ShippedScene {
     /// Name on the command line and in `rpc/load`.
     pub name: &'static str,
-    /// What happens in it, in one line.
-    pub description: &'static str,
     text: &'static str,
 }
 
 /// Name of the scene that runs when nothing else is asked for.
 pub const DEMONSTRATION: &str = "demonstration";
 
-macro_rules! scene {
-    ($name:literal, $description:literal) => {
-        ShippedScene {
-            name: $name,
-            description: $description,
-            text: include_str!(concat!("../../scenes/", $name, ".toml")),
-        }
+macro_rules! scenes {
+    ($($name:literal),* $(,)?) => {
+        [$(ShippedScene { name: $name, text: include_str!(concat!("../../scenes/", $name, ".toml")) }),*]
     };
 }
 
-/// Every scene that comes with the program, the demonstration first.
-pub const SHIPPED: [ShippedScene; 7] = [
-    scene!("demonstration", "An organ under tension is pressed by a finger and cut by a scalpel"),
-    scene!("kidney", "A growth on a kidney is undercut by a blade and lifted with forceps"),
-    scene!("brain", "A soft folded lobe is cut along its top and held open by two retractors"),
-    scene!("tendon", "A muscle under tension loses one of its three strands, cut along element faces"),
-    scene!("diaphragm", "A thin dome is pushed in, springs back and is slit beside its opening"),
-    scene!("vessel", "The fork of a stretched blood vessel is slit and gapes (neo-Hookean)"),
-    scene!("fingertip", "A rod rolls over a finger's pad, nearly incompressible, around a bone"),
+/// Every scene that comes with the program: the demonstration, organs, cuts, octree cells, single mechanisms.
+pub const SHIPPED: [ShippedScene; 31] = scenes![
+    "demonstration",
+    "kidney",
+    "brain",
+    "tendon",
+    "diaphragm",
+    "vessel",
+    "fingertip",
+    "tumour",
+    "textured-liver",
+    "organ-surface",
+    "muscle",
+    "two-hands",
+    "cut-with-force",
+    "first-cut",
+    "cut-along-faces",
+    "half-cut-beam",
+    "half-cut-equilibrium",
+    "three-cuts",
+    "both-elements",
+    "probed-block",
+    "slices",
+    "rods",
+    "soft-layer",
+    "creeping-strips",
+    "swinging-bar",
+    "ringing-bar",
+    "squeezed-block",
+    "tensile-test",
+    "bulge-test",
+    "relaxing-block",
+    "relaxing-cuts",
 ];
 
 impl ShippedScene {
@@ -49,11 +68,21 @@ impl ShippedScene {
         problem::nearest_word(name, SHIPPED.iter().map(|scene| scene.name))
     }
 
-    /// Reads and checks it.
+    /// What it shows, in one sentence.
+    pub fn description(&self) -> String {
+        let tree = Node::from_toml(self.text);
+        match tree.as_ref().ok().and_then(|tree| tree.get("description")).map(|node| &node.kind) {
+            Some(Kind::Text(text)) => text.clone(),
+            _ => String::new(),
+        }
+    }
+
+    /// Reads and checks it. Its files are inside the program; other paths are relative to the working directory.
     ///
     /// # Errors
     /// Overrides that lead nowhere or out of range.
     pub fn read(&self, overrides: &[String]) -> Result<Scene, SceneError> {
-        Scene::from_tree(self.name.to_owned(), PathBuf::new(), Node::from_toml(self.text), overrides)
+        let tree = Node::from_toml(&with_files_inside(self.text));
+        Scene::from_tree(self.name.to_owned(), PathBuf::new(), tree, overrides)
     }
 }

@@ -6,7 +6,6 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use scindo_world::inputs::Inputs;
-use scindo_world::mesh_in::Organ;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 
@@ -27,19 +26,6 @@ fn shipped() -> Vec<PathBuf> {
         entries.filter(|path| path.extension().is_some_and(|e| e == "toml")).collect();
     files.sort();
     files
-}
-
-/// Writes the surface that a user would put beside a scene.
-fn write_surface(path: &Path) {
-    let surface = Organ::Liver.surface();
-    let mut text = String::new();
-    for v in &surface.vertices {
-        text += &format!("v {} {} {}\n", v.x, v.y, v.z);
-    }
-    for [a, b, c] in &surface.triangles {
-        text += &format!("f {} {} {}\n", a + 1, b + 1, c + 1);
-    }
-    fs::write(path, text).unwrap();
 }
 
 /// What is wrong with the steps of a scene, until its last cut is made and its tools have gone through their
@@ -80,17 +66,9 @@ fn complaints(name: &str, mut sim: Simulation) -> Vec<String> {
 
 #[test]
 fn every_shipped_scene_meets_its_own_tolerance() {
-    let directory = tempfile::tempdir().unwrap();
-    let organ = directory.path().join("organ.obj");
-    write_surface(&organ);
     let run = |path: &Path| {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        let mut overrides: Vec<String> = Vec::new();
-        let text = fs::read_to_string(path).unwrap();
-        if text.contains("\"organ.obj\"") && !scenes().join("organ.obj").exists() {
-            overrides.push(format!("body.organ.mesh.surface={:?}", organ.display().to_string()));
-        }
-        let scene = Scene::load_with(path, &overrides).unwrap();
+        let scene = Scene::load(path).unwrap();
         complaints(&name, Simulation::new(&scene, scene.base_dir()).unwrap())
     };
     // Most scenes step on one thread; as many as there are cores step side by side.

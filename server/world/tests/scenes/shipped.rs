@@ -1,10 +1,11 @@
 //! Every example scene runs; the demonstration dents, is cut, opens and stays finite.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use scindo_world::inputs::Inputs;
 use scindo_world::mesh_in::Organ;
-use scindo_world::scene::Scene;
+use scindo_world::scene::{SHIPPED, Scene, ShippedScene};
 use scindo_world::simulation::Simulation;
 
 fn scenes() -> &'static Path {
@@ -27,6 +28,38 @@ fn start(name: &str, overrides: &[&str]) -> Simulation {
     let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
     let scene = Scene::load_with(&scenes().join(name), &overrides).unwrap();
     Simulation::new(&scene, scene.base_dir()).unwrap()
+}
+
+/// Both menus, `scindo demo --list` and the page's, list `SHIPPED`.
+#[test]
+fn every_scene_of_the_folder_ships_and_says_what_it_shows() {
+    let files = std::fs::read_dir(scenes()).unwrap().map(|entry| entry.unwrap().path());
+    let files: BTreeSet<String> = files
+        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
+        .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned())
+        .collect();
+    let shipped: BTreeSet<String> = SHIPPED.iter().map(|scene| scene.name.to_owned()).collect();
+    assert_eq!(shipped, files);
+    for scene in SHIPPED {
+        let said = scene.description();
+        assert!(said.len() > 30 && said.ends_with('.'), "{}: {said}", scene.name);
+        assert_eq!(scene.read(&[]).unwrap().description(), said);
+        assert_ne!(scene.read(&[]).unwrap().name(), "unnamed", "{}", scene.name);
+    }
+}
+
+/// Wherever the program stands, its scenes find their files inside it.
+#[test]
+fn shipped_scenes_bring_their_files() {
+    for name in ["organ-surface", "textured-liver"] {
+        let scene = ShippedScene::of_name(name).unwrap().read(&[]).unwrap();
+        let mut sim = Simulation::new(&scene, scene.base_dir()).unwrap();
+        assert!(sim.warnings().is_empty(), "{name}: {:?}", sim.warnings());
+        run(&mut sim, 0.1);
+        // A recording has the scene as JSON and looks for its files from another folder.
+        let again = Scene::from_json_in(&scene.to_json().to_string(), name, Path::new("/elsewhere")).unwrap();
+        assert!(Simulation::new(&again, again.base_dir()).is_ok());
+    }
 }
 
 #[test]
