@@ -25,7 +25,7 @@ for root in "$scratch/tree" "$scratch/deb/usr"; do
     share/fish/vendor_completions.d/scindo-view.fish share/scindo/scenes/KEYS.md \
     share/scindo/scenes/first-cut.toml share/scindo/proto/scindo/v1/server.proto share/doc/scindo/LICENSE-MIT \
     share/doc/scindo/guide/{first-scene,troubleshooting,scene/cutting}.md share/doc/scindo/guide/pictures/cells.png \
-    share/scindo/scenes/organ.obj \
+    share/doc/scindo/guide/pictures/gallery/kidney.jpg share/scindo/scenes/organ.obj \
     lib/systemd/system/scindo.service; do
     [ -s "$root/$file" ] || fail "$file is missing below $root"
   done

@@ -48,6 +48,25 @@ fn every_scene_of_the_folder_ships_and_says_what_it_shows() {
     }
 }
 
+/// The gallery of the guide, which `tests/gallery/page.py` writes, shows the scenes as they are.
+#[test]
+fn the_gallery_of_the_guide_shows_every_shipped_scene() {
+    let guide = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../deploy/guide"));
+    let page = std::fs::read_to_string(guide.join("gallery.md")).unwrap();
+    let mut entries = page.split("\n## ").skip(1);
+    for scene in SHIPPED {
+        let entry = entries.next().unwrap_or_default();
+        let picture = format!("pictures/gallery/{}.jpg", scene.name);
+        assert!(entry.starts_with(&format!("{}\n", scene.name)), "{} is not next: {entry}", scene.name);
+        let command = format!("`scindo demo {}`", scene.name);
+        for part in [scene.description(), format!("]({picture})"), command] {
+            assert!(entry.contains(&part), "{part} is not in: {entry}");
+        }
+        assert!((1..=40_000).contains(&std::fs::metadata(guide.join(picture)).unwrap().len()));
+    }
+    assert_eq!(entries.next(), None);
+}
+
 /// Wherever the program stands, its scenes find their files inside it.
 #[test]
 fn shipped_scenes_bring_their_files() {
