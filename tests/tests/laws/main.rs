@@ -6,4 +6,5 @@ mod architecture;
 mod circles;
 mod imports;
 mod links;
+mod ratchets;
 mod stairs;
