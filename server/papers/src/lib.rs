@@ -21,6 +21,7 @@ pub mod system;
 pub mod cases;
 
 #[allow(non_snake_case)]
+#[allow(clippy::needless_range_loop)] // i, j are tensor indices
 pub mod enrichment;
 
 #[allow(non_snake_case)]

@@ -274,10 +274,9 @@ fn haptics(measured: &Measured) -> String {
 
 /// What the effects of the scenes cost.
 pub fn effects(measured: &Measured) -> String {
-    let mut out = format!(
-        "<p><a href=\"index.html\">The book</a></p>\n<header><h1>What effects cost</h1>\n<p class=\"lead\">Processor \
-         time of a step with an effect and without it, on one thread.</p></header>\n"
-    );
+    let mut out = "<p><a href=\"index.html\">The book</a></p>\n<header><h1>What effects cost</h1>\n<p class=\"lead\">Processor \
+                   time of a step with an effect and without it, on one thread.</p></header>\n"
+        .to_owned();
     for (part, report) in measured.effects() {
         let number = |value: &Value| value.as_f64().filter(|ms| *ms > 0.0).map_or(String::new(), compact);
         let _ = write!(

@@ -211,9 +211,9 @@ fn places(positions: &[[f32; 3]]) -> Vec<Capsule> {
     let mut random = Random(1);
     (0..PLACES)
         .map(|_| {
-            let at = positions[(random.next() * positions.len() as f64) as usize % positions.len()];
+            let at = positions[(random.uniform() * positions.len() as f64) as usize % positions.len()];
             let tip = V::from(at.map(f64::from));
-            let away = V::from_fn(|_, _| random.next() - 0.5).normalize();
+            let away = V::from_fn(|_, _| random.uniform() - 0.5).normalize();
             let out = if away.dot(&tip) < 0.0 { -away } else { away };
             Capsule { core: [tip, tip + 0.02 * out], radius: 0.002 }
         })

@@ -8,7 +8,7 @@ pub struct Random(pub u64);
 
 impl Random {
     /// The next number, uniform in [0, 1).
-    pub fn next(&mut self) -> f64 {
+    pub fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -18,6 +18,6 @@ impl Random {
 
     /// The next vector, uniform in the cube of half width `r` around the origin.
     pub fn vector(&mut self, r: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| (2.0 * self.next() - 1.0) * r)
+        Vector3::from_fn(|_, _| (2.0 * self.uniform() - 1.0) * r)
     }
 }

@@ -96,9 +96,9 @@ fn least_fraction(tets: &Tets) -> f64 {
 /// A randomly tilted sweep across the box, from outside to a random depth.
 fn plane(random: &mut Random, cut: usize, low: Vector3<f64>, high: Vector3<f64>) -> CutRequest {
     let size = high - low;
-    let across = (0.15 + 0.7 * random.next()) * size.z + low.z;
-    let tilt = [0.2 * size.x * (random.next() - 0.5), 0.2 * size.y * (random.next() - 0.5)];
-    let depth = low.x + size.x * (0.2 + 0.6 * random.next());
+    let across = (0.15 + 0.7 * random.uniform()) * size.z + low.z;
+    let tilt = [0.2 * size.x * (random.uniform() - 0.5), 0.2 * size.y * (random.uniform() - 0.5)];
+    let depth = low.x + size.x * (0.2 + 0.6 * random.uniform());
     let at = |x: f64, far: bool, rise: f64| {
         let y = if far { high.y + 0.1 * size.y } else { low.y - 0.1 * size.y };
         Vector3::new(x, y, across + rise + if far { tilt[1] } else { 0.0 })

@@ -46,7 +46,7 @@ pub fn cylinder(seed: u64) -> Result<(TetMesh, [f64; 2]), Trouble> {
         let is_end = layer == 0 || layer == LAYERS - 1;
         for (ring, &count) in RINGS.iter().enumerate() {
             for k in 0..count {
-                let mut shift = || JITTER * (2.0 * random.next() - 1.0);
+                let mut shift = || JITTER * (2.0 * random.uniform() - 1.0);
                 let is_skin = ring == RINGS.len() - 1;
                 // Points of the skin stay on it.
                 let r = SPACING_M * (ring as f64 + if is_skin { 0.0 } else { shift() });
@@ -88,7 +88,7 @@ pub fn delaunay(points: Vec<V>, random: &mut Random) -> Result<TetMesh, Trouble>
     // A random order keeps the stars small.
     let mut order: Vec<u32> = (0..n as u32).collect();
     for i in (1..n).rev() {
-        order.swap(i, (random.next() * (i + 1) as f64) as usize);
+        order.swap(i, (random.uniform() * (i + 1) as f64) as usize);
     }
     for p in order {
         let (inside, outside): (Vec<_>, Vec<_>) =

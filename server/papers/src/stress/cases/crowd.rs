@@ -72,7 +72,7 @@ fn heap() -> String {
     .concat();
     for number in 0..50 {
         let place = [number % 5, number / 5 % 5, number / 25].map(f64::from);
-        let mut aside = || 0.008 * random.next();
+        let mut aside = || 0.008 * random.uniform();
         let low = [0.07 * place[0] + aside(), 0.07 * place[1] + aside(), 0.002 + 0.053 * place[2]];
         let high = [low[0] + 0.06, low[1] + 0.06, low[2] + 0.05];
         text += &format!(

@@ -99,9 +99,9 @@ fn run(setting: &Setting, turns: u64) -> Result<Record, Trouble> {
             sim.reset()?;
         }
         let cuts = sim.cuts_applied();
-        let from = Vector3::new(0.14 * random.next(), 0.06 * random.next(), 0.1);
+        let from = Vector3::new(0.14 * random.uniform(), 0.06 * random.uniform(), 0.1);
         let by = random.vector(0.03);
-        let mode = if random.next() < 0.5 { ToolMode::Touch } else { ToolMode::Grab };
+        let mode = if random.uniform() < 0.5 { ToolMode::Touch } else { ToolMode::Grab };
         let sweep = blade(&mut random);
         for step in 0..TURN {
             let share = step as f64 / (0.3 * TURN as f64);
@@ -144,10 +144,10 @@ fn tool(tip: Vector3<f64>, mode: ToolMode) -> ToolInput {
 
 /// An upright sweep across one of the blocks, as deep as chance will have it.
 fn blade(random: &mut Random) -> CutRequest {
-    let x = 0.01 + 0.12 * random.next();
-    let depth = 0.07 * random.next();
+    let x = 0.01 + 0.12 * random.uniform();
+    let depth = 0.07 * random.uniform();
     let edge = |y: f64| [Vector3::new(x, y, 0.08), Vector3::new(x, y, 0.061 - depth)];
-    let (start, end) = (-0.01, 0.07 * random.next());
+    let (start, end) = (-0.01, 0.07 * random.uniform());
     CutRequest { request: 1, tool: Arc::from("knife"), body: None, segments: vec![edge(start), edge(end)] }
 }
 
