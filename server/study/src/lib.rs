@@ -12,7 +12,7 @@
 //! through all cases, or asks what each [effect](study::effects) of a scene costs.
 //!
 //! Everything is a scene with changed keys, run by `scindo-world`. A refused scene is a result like any other. The
-//! cases and experiments of papers are in `scindo-papers`, as a [`Library`](study::Library) of names.
+//! cases and experiments of papers are in `scindo-papers`, as a [`Library`] of names.
 
 pub mod words;
 
