@@ -65,7 +65,7 @@ pub fn book(args: &BookArgs) -> Result<ExitCode, PapersError> {
                 Ok(()) if stop.load(Ordering::Relaxed) => State::NotRun,
                 Ok(()) => {
                     let finished = part.finish(&args.out, &origin, args.quick, seconds);
-                    finished.map_err(|error| unwritten((part.folder(&args.out), error)))?;
+                    finished.map_err(|error| unwritten(&part.folder(&args.out), &error))?;
                     State::Done
                 }
             }
@@ -123,7 +123,7 @@ fn make(part: &Part, args: &BookArgs, stop: &Arc<AtomicBool>, bar: &ProgressBar)
     let folder = part.folder(&args.out);
     let tell = |what: &str| bar.set_message(format!("{}: {what}", part.name));
     tell("");
-    std::fs::create_dir_all(&folder).map_err(|error| unwritten((folder.clone(), error)))?;
+    std::fs::create_dir_all(&folder).map_err(|error| unwritten(&folder, &error))?;
     match part.kind {
         Kind::Accuracy => {
             let settings = Settings {
@@ -163,7 +163,8 @@ fn make(part: &Part, args: &BookArgs, stop: &Arc<AtomicBool>, bar: &ProgressBar)
             let request = Request { steps: EFFECT_STEPS[usize::from(!args.quick)], stop: stop.clone() };
             let report =
                 measure(&scene, &request, &mut |what, _, _| tell(what)).map_err(RuntimeError::from)?;
-            put(&folder, [("effects.json", format!("{:#}\n", json!(report)))]).map_err(unwritten)?;
+            put(&folder, [("effects.json", format!("{:#}\n", json!(report)))])
+                .map_err(|(path, error)| unwritten(&path, &error))?;
         }
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! `scindo haptics` measures what the hand feels, by hand, delay and loss.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -58,12 +58,12 @@ pub(super) fn write(directory: &Path, trials: &[Trial]) -> Result<Value, PapersE
         ("haptics.json", format!("{report:#}\n")),
         ("ticks.csv", page::ticks(trials)),
     ];
-    put(directory, files).map_err(unwritten)?;
+    put(directory, files).map_err(|(path, error)| unwritten(&path, &error))?;
     Ok(report)
 }
 
 /// A file that could not be written.
-pub(super) fn unwritten((path, error): (PathBuf, io::Error)) -> RuntimeError {
+pub(super) fn unwritten(path: &Path, error: &io::Error) -> RuntimeError {
     RuntimeError::System {
         what: format!("writing {}", path.display()),
         reason: format!("{error}; choose another directory with --out"),
