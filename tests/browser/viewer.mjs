@@ -100,9 +100,9 @@ async function incisionOpens(page) {
     const body = window.scindo.bodies()[0];
     return { epoch: body.epoch, lipTriangles: body.lipTriangles, areaM2: window.scindo.lipArea(body.id) };
   });
-  // A busy machine may show the blade's way in so few pictures that the incision is done at the first look.
-  let first = null, marks = 0;
-  for (let attempt = 0; attempt < 4 && marks === 0; attempt++) {
+  // A busy machine may show the blade's way in so few pictures that the pause comes when the incision is done.
+  let first = null, marks = 0, grows = false;
+  for (let attempt = 0; attempt < 4 && !(marks > 0 && grows); attempt++) {
     if (attempt > 0) await reset(page);
     await until(page, "an incision begins", 4 * MINUTE, (epoch) => {
       const body = window.scindo.bodies()[0];
@@ -114,12 +114,15 @@ async function incisionOpens(page) {
     marks = await page.evaluate(() => window.scindo.bodies()[0].marks);
     await picture(page, "view-2-cut.png");
     await page.click("#pause");
+    await until(page, "the simulation goes on within the cut", MINUTE, () => !window.scindo.paused());
+    grows = await until(page, "the incision grows, or the blade is done", 4 * MINUTE, (first) => {
+      const body = window.scindo.bodies()[0];
+      if (body.lipTriangles > first.lipTriangles || body.epoch > first.epoch) return "grows";
+      return window.scindo.tools().every((tool) => tool.mode !== 4) && "done";
+    }, first) === "grows";
   }
   hold(marks > 0, `the line from the wound to the blade is drawn (${marks} parts)`);
-  await until(page, "the incision grows", 2 * MINUTE, (first) => {
-    const body = window.scindo.bodies()[0];
-    return body.lipTriangles > first.lipTriangles || body.epoch > first.epoch;
-  }, first);
+  hold(grows, "the incision grows");
   const wound = await coloured(page, "wound", 300, 2 * MINUTE, "view-3-open.png");
   Object.assign(summary, { lips: await lips(), woundPixels: wound });
   hold(wound >= 300, `the incision opens to the eye (${wound} wound pixels)`);
