@@ -1,4 +1,4 @@
-//! The thread team of `scindo-physics`, compiled with the threads and atomics of `shuttle`.
+//! The thread team of `scindo-matter`, compiled with the threads and atomics of `shuttle`.
 //!
 //! Every access to an atomic is a point where the scheduler may let another thread go on. A team that works on
 //! a machine millions of times may still hang or run a task twice in an order that the machine rarely takes;
@@ -11,5 +11,5 @@
 pub mod storage {
     pub mod sync;
 }
-#[path = "../../../server/physics/src/team/mod.rs"]
+#[path = "../../../server/matter/src/team/mod.rs"]
 pub mod team;

@@ -1,14 +1,14 @@
 //! How a body follows the refinement and coarsening of its cells between two steps.
 
 use nalgebra::Vector3;
+use scindo_matter::cut::NewCopy;
+use scindo_matter::element::Points;
+use scindo_matter::octree::{Activity, AdaptSettings, Family, Leaf, OUTSIDE, Restriction};
+use scindo_matter::storage::reserve::resize_reserving;
 
 use super::{Body, BodyError};
-use crate::cut::NewCopy;
-use crate::element::Points;
 use crate::integrator::Adapted;
-use crate::octree::{Activity, AdaptSettings, Family, Leaf, OUTSIDE, Restriction};
 use crate::space::{OctreeRefinement, OctreeSpace};
-use crate::storage::reserve::resize_reserving;
 
 /// What an adaptation changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -55,7 +55,7 @@ impl Body {
         if settings.is_off() {
             return Ok(AdaptReport::default());
         }
-        let of = |e: crate::octree::AdaptError| (e.name, e.found, e.allowed);
+        let of = |e: scindo_matter::octree::AdaptError| (e.name, e.found, e.allowed);
         settings.check().map_err(of).map_err(|(name, found, allowed)| BodyError::Criterion {
             name,
             found,

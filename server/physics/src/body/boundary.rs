@@ -1,17 +1,17 @@
 //! Constraints and loads, given by node and applied by copy.
 
 use nalgebra::Vector3;
+use scindo_matter::cut::NewCopy;
+use scindo_matter::cut::remesh::SnapNode;
+use scindo_matter::cut::remesh::node::NEW;
+use scindo_matter::element::MaterialPoint;
+use scindo_matter::element::{FixedCopy, Held};
+use scindo_matter::octree::{Coarsening, OUTSIDE};
+use scindo_matter::storage::reserve::resize_reserving;
 
 use super::pressing::PressureLoad;
 use super::{Body, BodyError};
-use crate::cut::NewCopy;
-use crate::cut::remesh::SnapNode;
-use crate::cut::remesh::node::NEW;
-use crate::element::MaterialPoint;
-use crate::element::{FixedCopy, Held};
-use crate::octree::{Coarsening, OUTSIDE};
 use crate::space::Space;
-use crate::storage::reserve::resize_reserving;
 
 /// A node whose displacement is prescribed in some directions.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

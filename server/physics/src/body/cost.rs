@@ -6,10 +6,10 @@
 //! the machine. Only the ratios of the costs matter. Tetrahedra that stay in the caches take 3.9 ns with AVX-512 and
 //! 4.9 ns with AVX2, blocks the same with both; the constants lie between them.
 
-use crate::material::Law;
-use crate::operator::OperatorChoice;
-use crate::solver::multigrid::CycleShape;
-use crate::solver::{Method, PcgSettings};
+use scindo_algebra::operator::OperatorChoice;
+use scindo_algebra::solver::multigrid::CycleShape;
+use scindo_algebra::solver::{Method, PcgSettings};
+use scindo_matter::material::Law;
 
 /// Up to this many pieces the stiffness stays in the caches from one application to the next.
 const CACHED_PIECES: usize = 60_000;

@@ -1,13 +1,13 @@
 //! How a body follows a change of its topology.
 
 use nalgebra::Vector3;
+use scindo_matter::cut::{BladeSweep, CutError, CutReport, NewCopy, Work};
+use scindo_matter::storage::reserve::{refill, resize_reserving};
 
 use super::snapping::FaceCut;
 use super::viscoelastic::Outline;
 use super::{Body, BodyError};
-use crate::cut::{BladeSweep, CutError, CutReport, NewCopy, Work};
 use crate::integrator::LooseParts;
-use crate::storage::reserve::{refill, resize_reserving};
 
 /// Pairs of sweep triangle and element that cost as much as one fragment, in a cut along faces.
 const SNAP_PAIRS_PER_FRAGMENT: usize = 4;

@@ -1,13 +1,13 @@
 //! Reasons why a body cannot be made or changed as requested.
 
+use scindo_algebra::assembly::ModelError;
+use scindo_matter::cut::CutError;
+use scindo_matter::material::{MaterialError, RegionsError};
+use scindo_matter::mesh::MeshError;
+use scindo_matter::skin::SkinError;
 use thiserror::Error;
 
-use crate::assembly::ModelError;
-use crate::cut::CutError;
 use crate::integrator::DynamicsError;
-use crate::material::{MaterialError, RegionsError};
-use crate::mesh::MeshError;
-use crate::skin::SkinError;
 
 /// A refused request; the body is as it was.
 #[derive(Debug, Error)]

@@ -1,13 +1,13 @@
 //! Quantities measured on a body, all in double precision. No step needs them.
 
 use nalgebra::{Matrix3, Vector3};
+use scindo_algebra::assembly::Model;
+use scindo_algebra::solver::multigrid::{CoarsestSolve, LevelReport};
+use scindo_matter::material::{first_piola, matrix};
+use scindo_matter::team::Team;
 
 use super::{Body, BodyError};
-use crate::assembly::Model;
 use crate::body::estimate::{CellRecovery, CutTets, MeshError, StressRecovery};
-use crate::material::{first_piola, matrix};
-use crate::solver::multigrid::{CoarsestSolve, LevelReport};
-use crate::team::Team;
 
 /// Counts of elements so flat that one of their motions is far stiffer than the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

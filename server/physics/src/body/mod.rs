@@ -11,6 +11,9 @@ mod measures;
 mod phases;
 mod precision;
 mod pressing;
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod pressing_tests;
 mod range;
 mod settings;
 mod sleep;
@@ -38,33 +41,33 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 
-use crate::assembly::Model;
-pub use crate::assembly::Volumetric;
-use crate::assembly::pressure::Pressure;
-pub use crate::cut::FrontRule;
-use crate::cut::remesh::Snapper;
-use crate::cut::{CutMesh, IncisionMark, Surface};
-pub use crate::element::ElementKind;
-use crate::element::FixedCopy;
 use crate::integrator::{
     Dynamics, LinearlyImplicit, LocalConnectivity, LooseParts, ModelSolver, State, StepInputs, StepSolver,
 };
 pub use crate::integrator::{
     MassKind, Notice, Outcome, PairSpring, PointSpring, Scheme, SolveReport, SpringKind,
 };
-use crate::material::{Material, Rayleigh, Regions};
-use crate::mesh::{HexMesh, TetMesh};
-pub use crate::operator::OperatorChoice;
-use crate::skin::{Kept, OwnSurface, Skin, SkinSettings, SkinShape};
-pub use crate::solver::multigrid::CycleShape;
-pub use crate::solver::{Method, PcgSettings, StopReason};
 use crate::space::{Space, Tets};
-use crate::storage::reserve::{refill, resize_reserving};
-use crate::team::Team;
-use crate::team::phase::Phase;
 use boundary::Boundary;
 use precision::too_flat_for_single;
 use range::{Beyond, Range};
+use scindo_algebra::assembly::Model;
+pub use scindo_algebra::assembly::Volumetric;
+use scindo_algebra::assembly::pressure::Pressure;
+pub use scindo_algebra::operator::OperatorChoice;
+pub use scindo_algebra::solver::multigrid::CycleShape;
+pub use scindo_algebra::solver::{Method, PcgSettings, StopReason};
+pub use scindo_matter::cut::FrontRule;
+use scindo_matter::cut::remesh::Snapper;
+use scindo_matter::cut::{CutMesh, IncisionMark, Surface};
+pub use scindo_matter::element::ElementKind;
+use scindo_matter::element::FixedCopy;
+use scindo_matter::material::{Material, Rayleigh, Regions};
+use scindo_matter::mesh::{HexMesh, TetMesh};
+use scindo_matter::skin::{Kept, OwnSurface, Skin, SkinSettings, SkinShape};
+use scindo_matter::storage::reserve::{refill, resize_reserving};
+use scindo_matter::team::Team;
+use scindo_matter::team::phase::Phase;
 use snapping::{FaceCut, SnapState};
 
 /// Material constants that may change while a body moves.

@@ -1,10 +1,11 @@
 //! Who is told of the phases of a step.
 
+use scindo_matter::team::phase::PhaseMark;
+
 use super::Body;
-use crate::team::phase::PhaseMark;
 
 impl Body {
-    /// Calls `mark` with each [`Phase`](crate::team::phase::Phase) of a step when it begins, on the thread that
+    /// Calls `mark` with each [`Phase`](scindo_matter::team::phase::Phase) of a step when it begins, on the thread that
     /// steps; `None` ends that. The last phase ends when [`step`](Self::step) returns. Results do not
     /// change.
     ///

@@ -5,8 +5,7 @@
 //! A strain below that is noise, and its stress is a spurious force.
 
 use nalgebra::Vector3;
-
-use crate::mesh::TetMesh;
+use scindo_matter::mesh::TetMesh;
 
 /// L |g| above which noise counts. It is then a strain of 2e-5; soft tissue under its own weight has 1e-3.
 const FLAT: f64 = 300.0;
@@ -26,7 +25,7 @@ pub(super) fn too_flat_for_single(mesh: &TetMesh) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{BoxPattern, box_mesh};
+    use scindo_matter::mesh::{BoxPattern, box_mesh};
 
     #[test]
     fn foils_are_too_flat_and_slivers_in_a_sound_body_are_not() {

@@ -4,7 +4,7 @@
 //! configuration, and so are n and da. How the force follows the surface depends on the way of a step:
 //!
 //! - On the general path it is a part of Newton's method, with its load stiffness
-//!   ([`crate::assembly::pressure`]), and explicit schemes evaluate it in every stage. Their critical step leaves
+//!   ([`scindo_algebra::assembly::pressure`]), and explicit schemes evaluate it in every stage. Their critical step leaves
 //!   the load stiffness out, which is about p/E of the elastic one.
 //! - On the fast path it is that at the predicted positions x + h v, and a dead load within the step. The error of
 //!   this lag falls with h². In a strip that bends by its own length it is an eighteenth of the error of BDF2, a
@@ -12,9 +12,9 @@
 //!   nodes and the faces under pressure per step.
 
 use nalgebra::Vector3;
+use scindo_matter::material::Law;
 
 use super::{Body, BodyError, Scheme};
-use crate::material::Law;
 
 /// A pressure as requested; cuts do not change it.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]

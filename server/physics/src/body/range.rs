@@ -5,9 +5,9 @@
 //! be worse. The check is one pass over the positions; it does not allocate while the parts stay.
 
 use nalgebra::Vector3;
+use scindo_matter::cut::NewCopy;
+use scindo_matter::element::FixedCopy;
 
-use crate::cut::NewCopy;
-use crate::element::FixedCopy;
 use crate::integrator::LooseParts;
 
 /// Largest extent of a part, as a multiple of that at rest or of that of its prescribed positions.
@@ -148,7 +148,7 @@ impl Range {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::Held;
+    use scindo_matter::element::Held;
 
     /// Two edges of 1 m, held at their first ends.
     fn two_edges() -> (Vec<Vector3<f64>>, LooseParts, Range) {

@@ -1,16 +1,17 @@
 //! How a body is discretised and solved, and which combinations the fast path supports.
 
+use scindo_algebra::assembly::Volumetric;
+use scindo_algebra::operator::OperatorChoice;
+use scindo_algebra::solver::multigrid::CycleShape;
+use scindo_algebra::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
+use scindo_matter::cut::FrontRule;
+use scindo_matter::cut::remesh::SnapSettings;
+use scindo_matter::element::ElementKind;
+use scindo_matter::element::Simd;
+use scindo_matter::material::{Fibres, Law, Prony};
+
 use super::{Ablation, BodyError, CuttingMethod, LooseRule, cost};
-use crate::assembly::Volumetric;
-use crate::cut::FrontRule;
-use crate::cut::remesh::SnapSettings;
-use crate::element::ElementKind;
-use crate::element::Simd;
 use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
-use crate::material::{Fibres, Law, Prony};
-use crate::operator::OperatorChoice;
-use crate::solver::multigrid::CycleShape;
-use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
 /// Settings that are chosen when a body is made.
 ///

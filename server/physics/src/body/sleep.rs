@@ -4,9 +4,9 @@
 //! grows. So does the range of numbers that a step has to represent.
 
 use nalgebra::Vector3;
+use scindo_matter::element::{FixedCopy, Held};
 
 use super::Body;
-use crate::element::{FixedCopy, Held};
 
 impl Body {
     /// Puts a part that is held nowhere to sleep. Every copy of it is held where it is, at rest, until

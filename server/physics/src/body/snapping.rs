@@ -1,25 +1,25 @@
 //! Cuts that change the mesh itself; all data on it follows.
 
 use nalgebra::Vector3;
+use scindo_matter::cut::remesh::{MeshCut, Nodes, SnapCut, SnapNode, SnapReport, SnapSettings, Snapper};
+use scindo_matter::cut::{BladeSweep, CutMesh, CutReport, NewCopy};
+use scindo_matter::mesh::TetMesh;
 
 use super::boundary::Boundary;
 use super::{Body, BodyError};
-use crate::cut::remesh::{MeshCut, Nodes, SnapCut, SnapNode, SnapReport, SnapSettings, Snapper};
-use crate::cut::{BladeSweep, CutMesh, CutReport, NewCopy};
-use crate::mesh::TetMesh;
 use crate::space::Tets;
 
 /// How cuts are made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum CuttingMethod {
-    /// Pieces and copies inside the elements ([`crate::cut`]).
+    /// Pieces and copies inside the elements ([`scindo_matter::cut`]).
     #[default]
     Xfem,
-    /// Along element faces, with nodes moved onto the sweep ([`crate::cut::remesh`]); tet4 only.
+    /// Along element faces, with nodes moved onto the sweep ([`scindo_matter::cut::remesh`]); tet4 only.
     Snap,
-    /// Elements are divided along the sweep ([`crate::cut::remesh::subdivide`]); tet4 only. A baseline for comparisons.
+    /// Elements are divided along the sweep ([`scindo_matter::cut::remesh::subdivide`]); tet4 only. A baseline for comparisons.
     Subdivide,
-    /// Elements that the sweep touches are removed ([`crate::cut::remesh::remove`]); tet4 only. A baseline for comparisons.
+    /// Elements that the sweep touches are removed ([`scindo_matter::cut::remesh::remove`]); tet4 only. A baseline for comparisons.
     Remove,
 }
 
@@ -53,7 +53,7 @@ pub(super) struct SnapState {
     /// Constraints and loads after the last cut, including pins of loose parts.
     carried: Boundary,
     report: SnapReport,
-    /// For every node, the node of the uncut mesh that it was, or [`crate::cut::remesh::node::NEW`].
+    /// For every node, the node of the uncut mesh that it was, or [`scindo_matter::cut::remesh::node::NEW`].
     origins: Vec<u32>,
 }
 
@@ -102,7 +102,7 @@ impl Body {
         self.snap.as_deref().map(|snap| &snap.report)
     }
 
-    /// For every node, the node of the uncut mesh that it was, or [`crate::cut::remesh::node::NEW`]. `None` if
+    /// For every node, the node of the uncut mesh that it was, or [`scindo_matter::cut::remesh::node::NEW`]. `None` if
     /// cuts leave the mesh of the body alone.
     pub fn node_origins(&self) -> Option<&[u32]> {
         self.snap.as_deref().map(|snap| &snap.origins[..])

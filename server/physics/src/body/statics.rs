@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use scindo_algebra::solver::{Curvature, LinearSettings, Newton, NewtonSettings, PcgSettings, StopReason};
+use scindo_matter::material::Law;
 
 use super::{Body, BodyError};
 use crate::integrator::{StaticProblem, find_equilibrium};
-use crate::material::Law;
-use crate::solver::{Curvature, LinearSettings, Newton, NewtonSettings, PcgSettings, StopReason};
 
 /// Stopping criteria of a static solve.
 #[derive(Clone, Copy, Debug, PartialEq)]

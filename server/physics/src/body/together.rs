@@ -1,13 +1,13 @@
 //! Steps of several bodies that touch.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::pressure::Pressure;
+use scindo_algebra::solver::{PcgSettings, StopReason};
+use scindo_matter::element::FixedCopy;
 use smallvec::SmallVec;
 
 use super::{Body, Notice, Outcome, PointSpring, Scheme, SolveReport};
-use crate::assembly::pressure::Pressure;
-use crate::element::FixedCopy;
 use crate::integrator::{LooseParts, PairSpring, StepInputs, Together};
-use crate::solver::{PcgSettings, StopReason};
 use crate::space::Space;
 
 /// Bodies for which a group needs no memory beyond that of its last step.

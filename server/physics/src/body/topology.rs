@@ -4,10 +4,10 @@
 //! can answer the same queries.
 
 use nalgebra::Vector3;
+use scindo_matter::cut::{Components, Flaws, Solid, Surface};
+use scindo_matter::element::MaterialPoint;
 
 use super::Body;
-use crate::cut::{Components, Flaws, Solid, Surface};
-use crate::element::MaterialPoint;
 use crate::space::{RestPoint, Tets, VisitPiece};
 
 impl Body {

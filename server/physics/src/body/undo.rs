@@ -9,11 +9,11 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
+use scindo_matter::mesh::TetMesh;
 
 use super::boundary::Boundary;
 use super::snapping::SnapState;
 use super::{Body, BodyError};
-use crate::mesh::TetMesh;
 use crate::space::Space;
 
 /// The topology of a body at some time: mesh, pieces, copies and skin, without positions.

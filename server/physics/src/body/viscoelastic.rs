@@ -6,10 +6,11 @@
 
 use std::collections::BTreeMap;
 
+use scindo_algebra::assembly::Model;
+use scindo_matter::material::Strain;
+use scindo_matter::octree::{At, Cell};
+
 use super::Body;
-use crate::assembly::Model;
-use crate::material::Strain;
-use crate::octree::{At, Cell};
 use crate::space::Space;
 
 /// The elements of a viscoelastic body before a change, and the strains of its springs.

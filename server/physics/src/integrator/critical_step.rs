@@ -6,16 +6,15 @@
 //! deterministic. There is no reorthogonalisation, which the extreme value does not need (Paige 1980).
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::{BlockCsr, Model, Tangent};
+use scindo_matter::element::FixedCopy;
+use scindo_matter::material::Rayleigh;
+use scindo_matter::team::Team;
 
 use super::mass::Mass;
 use super::scheme::{MassKind, Scheme};
 use super::springs::ActiveSpring;
 use super::state::hold;
-use crate::assembly::{BlockCsr, Model, Tangent};
-
-use crate::element::FixedCopy;
-use crate::material::Rayleigh;
-use crate::team::Team;
 
 /// Largest number of products with K; far more than a mesh of good quality needs.
 const MOST_PRODUCTS: usize = 300;

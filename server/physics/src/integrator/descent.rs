@@ -2,19 +2,19 @@
 //!
 //! Each solve has the stiffness K̂ = Σ R K Rᵀ with the rotations where it begins. K̂ is positive semidefinite, so δ
 //! points downhill, but it is not the Hessian: the full step may lead too far. [Pairs](QuasiNewton) of earlier steps
-//! correct it. The potential decides in double precision, as in [`Newton`](crate::solver::Newton): the stored energy
+//! correct it. The potential decides in double precision, as in [`Newton`](scindo_algebra::solver::Newton): the stored energy
 //! Ψ(x) and that of the springs, less the work f·(x − X) of the loads.
 //!
 //! # Source
 //! Nocedal, Wright 2006: Numerical Optimization, §3.1 (backtracking), §3.2 (descent with approximate Hessians).
 
 use nalgebra::Vector3;
+use scindo_algebra::operator::Padded;
+use scindo_matter::storage::reserve::resize_reserving;
 
 use super::quasi_newton::QuasiNewton;
 use super::springs::ActiveSpring;
 use super::step_inputs::LinearInputs;
-use crate::operator::Padded;
-use crate::storage::reserve::resize_reserving;
 
 /// The part of the promised decrease that a step must keep (Armijo 1966).
 const ARMIJO: f64 = 1e-4;

@@ -5,6 +5,13 @@
 //! finite, and every departure from what was requested is reported.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::{Model, ModelError};
+use scindo_algebra::operator::Stiffness;
+use scindo_matter::cut::NewCopy;
+use scindo_matter::element::FixedCopy;
+use scindo_matter::material::{Law, Material};
+use scindo_matter::storage::reserve::resize_reserving;
+use scindo_matter::team::Team;
 
 use super::active_springs::make_room;
 use super::course::Course;
@@ -20,14 +27,7 @@ use super::state::State;
 use super::step_inputs::StepInputs;
 use super::step_solver::{SolverSettings, StepSolver};
 use super::together::Member;
-use crate::assembly::{Model, ModelError};
-use crate::cut::NewCopy;
-use crate::element::FixedCopy;
-use crate::material::{Law, Material};
-use crate::operator::Stiffness;
 use crate::space::Space;
-use crate::storage::reserve::resize_reserving;
-use crate::team::Team;
 
 /// Integrates the motion of one body; owns all memory that a step needs.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]

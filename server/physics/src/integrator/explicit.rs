@@ -1,6 +1,11 @@
 //! Explicit schemes: symplectic Euler, midpoint, fourth-order Runge–Kutta.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::Tangent;
+use scindo_matter::element::FixedCopy;
+use scindo_matter::material::Law;
+use scindo_matter::team::Team;
+use scindo_matter::team::phase::Phase;
 
 use super::course::Course;
 use super::critical_step::stable_step;
@@ -10,11 +15,6 @@ use super::report::{Outcome, SolveReport};
 use super::scheme::Scheme;
 use super::state::{State, hold};
 use super::step_inputs::StepInputs;
-use crate::assembly::Tangent;
-use crate::element::FixedCopy;
-use crate::material::Law;
-use crate::team::Team;
-use crate::team::phase::Phase;
 
 /// Fraction of the longest stable step that is used.
 const MARGIN: f64 = 0.95;

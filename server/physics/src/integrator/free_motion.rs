@@ -6,9 +6,9 @@
 //! rest configuration: a hinge or a pendulum counts as free.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
+use scindo_matter::element::FixedCopy;
 
 use super::parts::LooseParts;
-use crate::element::FixedCopy;
 
 /// Eigenvalues below this fraction of the trace count as zero: rounding, or a held angle of 1e-6.
 const NULL: f64 = 1e-12;

@@ -1,6 +1,12 @@
 //! Implicit steps of a discrete model: static equilibrium, implicit Euler, BDF2, Newmark.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::Tangent;
+use scindo_algebra::solver::{NewtonReport, NewtonSettings, Potential, StopReason};
+use scindo_matter::element::Points;
+use scindo_matter::material::{Law, Rayleigh};
+use scindo_matter::team::Team;
+use scindo_matter::team::phase::Phase;
 
 use super::course::Course;
 use super::model_solver::{ModelSolver, finite};
@@ -12,12 +18,6 @@ use super::settings::LEAST_NEWTON_STEPS;
 use super::state::State;
 use super::statics::prescribe;
 use super::step_inputs::{StepHistory, StepInputs};
-use crate::assembly::Tangent;
-use crate::element::Points;
-use crate::material::{Law, Rayleigh};
-use crate::solver::{NewtonReport, NewtonSettings, Potential, StopReason};
-use crate::team::Team;
-use crate::team::phase::Phase;
 
 /// An element whose ‖F‖ is below this has collapsed.
 const COLLAPSED: f64 = 0.05;

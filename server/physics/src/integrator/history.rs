@@ -1,12 +1,12 @@
 //! States of earlier steps, for schemes that need them.
 
 use nalgebra::Vector3;
+use scindo_matter::cut::NewCopy;
+use scindo_matter::octree::Restriction;
 
 use super::guard::LARGEST_TURN;
 use super::notice::Notice;
 use super::state::State;
-use crate::cut::NewCopy;
-use crate::octree::Restriction;
 
 /// The last two states.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]

@@ -18,6 +18,19 @@ pub mod together;
 
 use coarse::two_level;
 use nalgebra::{Matrix3, Vector3};
+use scindo_algebra::operator::{
+    BLOCK, Block6, BlockJacobi, CompositeDiagonal, LinearOperator, Padded, Spring, StiffModes, Stiffness,
+    Substitution, Sum, SystemOperator, apply, block_of, filter, invert, invert_free, padded, unpadded,
+};
+use scindo_algebra::solver::multigrid::{CoarsestSolve, CycleShape, Hierarchy, LevelReport, Multigrid};
+use scindo_algebra::solver::two_level::CoarseSpace;
+use scindo_algebra::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
+use scindo_matter::element::{FixedCopy, Held};
+use scindo_matter::material::Rayleigh;
+use scindo_matter::octree::Octree;
+use scindo_matter::storage::reserve::resize_reserving;
+use scindo_matter::team::phase::Phase;
+use scindo_matter::team::{Team, blocks};
 
 use super::active_springs::ActiveSprings;
 use super::descent::Descent;
@@ -27,19 +40,6 @@ use super::springs::ActiveSpring;
 use super::state::{State, WEIGHTLESS, hold};
 use super::step_grid::StepGrid;
 use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
-use crate::element::{FixedCopy, Held};
-use crate::material::Rayleigh;
-use crate::octree::Octree;
-use crate::operator::{
-    BLOCK, Block6, BlockJacobi, CompositeDiagonal, LinearOperator, Padded, Spring, StiffModes, Stiffness,
-    Substitution, Sum, SystemOperator, apply, block_of, filter, invert, invert_free, padded, unpadded,
-};
-use crate::solver::multigrid::{CoarsestSolve, CycleShape, Hierarchy, LevelReport, Multigrid};
-use crate::solver::two_level::CoarseSpace;
-use crate::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
-use crate::storage::reserve::resize_reserving;
-use crate::team::phase::Phase;
-use crate::team::{Team, blocks};
 
 /// Part of the residual that a solve leaves on the way to an equilibrium of a law that rotates, at most; the last
 /// one reaches the tolerance.

@@ -2,6 +2,14 @@
 //! step, two with Newmark's method.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::ModelError;
+use scindo_algebra::operator::{ElasticUpdate, Stiffness};
+use scindo_algebra::solver::multigrid::{CoarsestSolve, CycleShape, LevelReport};
+use scindo_algebra::solver::{Method, PcgSettings};
+use scindo_matter::element::{Points, Simd};
+use scindo_matter::material::Material;
+use scindo_matter::storage::reserve::{refill, resize_reserving};
+use scindo_matter::team::Team;
 
 use super::course::Course;
 use super::linear_step::LinearStep;
@@ -12,16 +20,8 @@ use super::state::{State, WEIGHTLESS};
 use super::step_inputs::{Inertia, LinearInputs, StepInputs, StepOutcome};
 use super::step_solver::{SolverSettings, StepSolver};
 use super::together::Member;
-use crate::assembly::ModelError;
-use crate::element::{Points, Simd};
-use crate::material::Material;
-use crate::operator::{ElasticUpdate, Stiffness};
-use crate::solver::multigrid::{CoarsestSolve, CycleShape, LevelReport};
-use crate::solver::{Method, PcgSettings};
 use crate::space::OctreeSpace;
 use crate::space::Space;
-use crate::storage::reserve::{refill, resize_reserving};
-use crate::team::Team;
 
 /// A step that fails is tried again in 2 and then in 4 parts.
 const MOST_HALVINGS: u32 = 2;
@@ -53,7 +53,7 @@ pub struct LinearlyImplicit {
     simulate_level: usize,
     cycle: CycleShape,
     relaxes: bool,
-    #[serde(with = "crate::operator::saved_stiffness")]
+    #[serde(with = "scindo_algebra::operator::saved_stiffness")]
     stiffness: Box<dyn Stiffness>,
     /// Whether the stiffness uses only instructions that every machine has.
     simd: Simd,

@@ -4,13 +4,14 @@
 //! then show that the parts of the body are still those from before. Only if they do not show it is the
 //! whole body searched.
 
+use scindo_matter::cut::NewCopy;
+use scindo_matter::element::FixedCopy;
+use scindo_matter::storage::disjoint::{find, join};
+use scindo_matter::storage::numbering::Numbering;
+use scindo_matter::storage::reserve::resize_reserving;
+
 use super::parts::LooseParts;
-use crate::cut::NewCopy;
-use crate::element::FixedCopy;
 use crate::space::Space;
-use crate::storage::disjoint::{find, join};
-use crate::storage::numbering::Numbering;
-use crate::storage::reserve::resize_reserving;
 
 /// Buffers of the local search.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
@@ -96,11 +97,11 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::cut::{BladeSweep, CutMesh};
-    use crate::element::Held;
-    use crate::mesh::{BoxPattern, box_mesh};
     use crate::space::Tets;
-    use crate::team::Team;
+    use scindo_matter::cut::{BladeSweep, CutMesh};
+    use scindo_matter::element::Held;
+    use scindo_matter::mesh::{BoxPattern, box_mesh};
+    use scindo_matter::team::Team;
 
     #[test]
     fn parts_that_follow_cuts_are_those_of_the_whole_body() {

@@ -1,11 +1,11 @@
 //! The mass of a body, lumped or consistent, behind one interface.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::{BlockCsr, Model};
+use scindo_algebra::solver::{LinearSettings, LinearSolver, Method, Precision};
+use scindo_matter::team::Team;
 
 use super::scheme::MassKind;
-use crate::assembly::{BlockCsr, Model};
-use crate::solver::{LinearSettings, LinearSolver, Method, Precision};
-use crate::team::Team;
 
 /// Mass matrix M [kg].
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
@@ -99,7 +99,7 @@ impl Mass {
     }
 
     /// Sets the prescribed directions; M⁻¹ then acts on the others.
-    pub fn hold(&mut self, fixed: &[crate::element::FixedCopy]) {
+    pub fn hold(&mut self, fixed: &[scindo_matter::element::FixedCopy]) {
         if let Some((M, _)) = &self.consistent {
             self.solver.set_matrix(M, fixed);
         }

@@ -7,6 +7,14 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::pressure::Follower;
+use scindo_algebra::assembly::{BlockCsr, Model, ModelError, Volumetric};
+use scindo_algebra::solver::Newton;
+use scindo_matter::element::FixedCopy;
+use scindo_matter::element::Points;
+use scindo_matter::material::{Fibres, Material, Prony};
+use scindo_matter::storage::reserve::resize_reserving;
+use scindo_matter::team::Team;
 
 use super::active_springs::ActiveSprings;
 use super::course::Course;
@@ -21,15 +29,7 @@ use super::settings::DynamicsSettings;
 use super::state::State;
 use super::step_inputs::StepInputs;
 use super::step_solver::{SolverSettings, StepSolver};
-use crate::assembly::pressure::Follower;
-use crate::assembly::{BlockCsr, Model, ModelError, Volumetric};
-use crate::element::FixedCopy;
-use crate::element::Points;
-use crate::material::{Fibres, Material, Prony};
-use crate::solver::Newton;
 use crate::space::Space;
-use crate::storage::reserve::resize_reserving;
-use crate::team::Team;
 
 /// Positions beyond this [m] count as not finite.
 const FARTHEST: f64 = 1e15;

@@ -2,6 +2,12 @@
 //! implicit Euler where the scheme would fail.
 
 use nalgebra::Vector3;
+use scindo_algebra::operator::BLOCK;
+use scindo_matter::cut::NewCopy;
+use scindo_matter::material::Law;
+use scindo_matter::octree::Restriction;
+use scindo_matter::storage::reserve::resize_reserving;
+use scindo_matter::team::{Team, blocks};
 
 use super::guard::{GAIN_CONSERVING, GAIN_DISSIPATING, LARGEST_TURN, Ledger};
 use super::history::History;
@@ -11,12 +17,6 @@ use super::scheme::Scheme;
 use super::spin::SpinGuard;
 use super::state::State;
 use super::step_inputs::{StepHistory, StepInputs};
-use crate::cut::NewCopy;
-use crate::material::Law;
-use crate::octree::Restriction;
-use crate::operator::BLOCK;
-use crate::storage::reserve::resize_reserving;
-use crate::team::{Team, blocks};
 
 /// A change of the elements that leaves the material whole.
 #[derive(Clone, Copy, Debug)]

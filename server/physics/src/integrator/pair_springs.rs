@@ -1,11 +1,11 @@
 //! Springs between two material points: of two bodies, or of one.
 
 use nalgebra::{Matrix3, Vector3};
+use scindo_algebra::operator::{Padded, padded};
+use scindo_matter::element::MaterialPoint;
 use smallvec::SmallVec;
 
 use super::springs::{SpringKind, SpringLaw};
-use crate::element::MaterialPoint;
-use crate::operator::{Padded, padded};
 
 /// A spring between a point and a triangle of points, on two bodies or on one.
 ///

@@ -6,10 +6,9 @@
 //! falls with g and answers to its springs exactly, however few iterations are made.
 
 use nalgebra::{Matrix3, Vector3};
-
-use crate::element::FixedCopy;
-use crate::storage::disjoint::{find, join};
-use crate::storage::reserve::resize_reserving;
+use scindo_matter::element::FixedCopy;
+use scindo_matter::storage::disjoint::{find, join};
+use scindo_matter::storage::reserve::resize_reserving;
 
 /// Connected parts of a body, by copy.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -5,20 +5,20 @@
 //!
 //!   Φ(x) = A/2 ‖x − x_a‖²_M + αB/2 ‖x − x_v‖²_M + βB/2 ‖x − x_v‖²_K̂ + Ψ(x) − f_ext·(x − x_a) + Σ springs + P(x)
 //!
-//! with K̂ held at the predictor, and [pressure](crate::assembly::pressure) as the potential P around the iterate.
+//! with K̂ held at the predictor, and [pressure](scindo_algebra::assembly::pressure) as the potential P around the iterate.
 //!
 //! # Source
 //! Radovitzky, Ortiz 1999 (incremental potential of Newmark schemes); Martin et al. 2011.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::pressure::{Follower, Pressure};
+use scindo_algebra::assembly::{BlockCsr, Model, Tangent};
+use scindo_algebra::solver::{Curvature, Potential};
+use scindo_matter::team::Team;
 
 use super::increment::Increment;
 use super::mass::Mass;
 use super::springs::ActiveSpring;
-use crate::assembly::pressure::{Follower, Pressure};
-use crate::assembly::{BlockCsr, Model, Tangent};
-use crate::solver::{Curvature, Potential};
-use crate::team::Team;
 
 /// Φ of one step; borrows all its data.
 pub(super) struct StepPotential<'a> {

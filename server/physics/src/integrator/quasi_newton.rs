@@ -9,8 +9,8 @@
 //! place of a multiple of I: Liu, Bouaziz, Kavan 2017: Quasi-Newton methods for real-time simulation of
 //! hyperelastic materials, §4.
 
-use crate::operator::Padded;
-use crate::storage::reserve::resize_reserving;
+use scindo_algebra::operator::Padded;
+use scindo_matter::storage::reserve::resize_reserving;
 
 /// Pairs that are kept.
 const PAIRS: usize = 6;

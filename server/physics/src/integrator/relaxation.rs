@@ -7,12 +7,12 @@
 //! (Shewchuk 1994, §14), and a step is taken only if it lowers the potential.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::BlockCsr;
+use scindo_algebra::solver::{Curvature, DiagonalInverse, Filter, Potential, StopReason};
+use scindo_matter::element::FixedCopy;
+use scindo_matter::team::Team;
 
 use super::statics::prescribe;
-use crate::assembly::BlockCsr;
-use crate::element::FixedCopy;
-use crate::solver::{Curvature, DiagonalInverse, Filter, Potential, StopReason};
-use crate::team::Team;
 
 /// Result of one frame of relaxation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

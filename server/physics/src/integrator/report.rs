@@ -1,8 +1,9 @@
 //! What a step reports.
 
+use scindo_algebra::solver::StopReason;
+
 use super::notice::Notice;
 use super::scheme::Scheme;
-use crate::solver::StopReason;
 
 /// Result of one step of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -1,8 +1,7 @@
 //! Time integration schemes.
 
+use scindo_algebra::assembly::MassSharing;
 use thiserror::Error;
-
-use crate::assembly::MassSharing;
 
 /// Settings with which no step can be made.
 #[derive(Clone, Debug, Error, PartialEq)]

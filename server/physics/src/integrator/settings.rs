@@ -1,7 +1,8 @@
 //! Settings of the integration of a discrete model: scheme, mass, Newton's method, limits of explicit steps.
 
+use scindo_algebra::solver::{LinearSettings, Method, NewtonSettings, Precision};
+
 use super::scheme::{MassKind, Scheme};
-use crate::solver::{LinearSettings, Method, NewtonSettings, Precision};
 
 /// Settings of a [`ModelSolver`](super::ModelSolver).
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -10,19 +10,19 @@
 //! *Inexact preconditioned conjugate gradient method with inner-outer iteration*.
 
 use nalgebra::Vector3;
-
-use super::step_grid::set_coefficients;
-use super::step_inputs::{LinearInputs, StepInputs};
-use crate::element::FixedCopy;
-use crate::octree::Octree;
-use crate::operator::{
+use scindo_algebra::operator::{
     BLOCK, LinearOperator, Padded, Preconditioner, Spring, Stiffness, block_of, filter, padded, rows,
     unpadded,
 };
-use crate::solver::multigrid::{Coefficients, Composite, CycleShape, Hierarchy, Multigrid};
-use crate::solver::{LinearReport, Method, Pcg, PcgSettings, StopReason};
-use crate::storage::reserve::resize_reserving;
-use crate::team::{Team, blocks};
+use scindo_algebra::solver::multigrid::{Coefficients, Composite, CycleShape, Hierarchy, Multigrid};
+use scindo_algebra::solver::{LinearReport, Method, Pcg, PcgSettings, StopReason};
+use scindo_matter::element::FixedCopy;
+use scindo_matter::octree::Octree;
+use scindo_matter::storage::reserve::resize_reserving;
+use scindo_matter::team::{Team, blocks};
+
+use super::step_grid::set_coefficients;
+use super::step_inputs::{LinearInputs, StepInputs};
 
 /// Largest number of inner solves. Where the norm of the residual does not halve in one, further ones do not pay.
 const MOST_SOLVES: u32 = 10;

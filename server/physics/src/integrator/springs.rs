@@ -1,9 +1,8 @@
 //! Springs between material points and the world: contacts, grabs, tools.
 
 use nalgebra::{Matrix3, Vector3};
-
-use crate::element::MaterialPoint;
-use crate::operator::Spring;
+use scindo_algebra::operator::Spring;
+use scindo_matter::element::MaterialPoint;
 
 /// A spring on a material point x_p.
 ///

@@ -1,9 +1,8 @@
 //! What a body keeps from step to step.
 
 use nalgebra::Vector3;
-
-use crate::element::FixedCopy;
-use crate::material::Strain;
+use scindo_matter::element::FixedCopy;
+use scindo_matter::material::Strain;
 
 /// What a body keeps from step to step: positions and velocities, one entry per copy, and what relaxes in a viscoelastic
 /// body.
@@ -13,7 +12,7 @@ pub struct State {
     pub x: Vec<Vector3<f64>>,
     /// Velocities [m/s].
     pub v: Vec<Vector3<f64>>,
-    /// Strains d of the springs of a [`Prony`](crate::material::Prony) series, per element, quadrature point and term.
+    /// Strains d of the springs of a [`Prony`](scindo_matter::material::Prony) series, per element, quadrature point and term.
     /// Empty without one.
     pub viscous: Vec<Strain>,
 }

@@ -1,16 +1,15 @@
 //! Static equilibrium of a model: the minimum of Π(x) = Ψ(x) − f·(x − X), with pressure as its potential around the
 //! iterate.
 //!
-//! [`StaticProblem`] is that potential, for Newton's method ([`crate::solver::Newton`]) or for
+//! [`StaticProblem`] is that potential, for Newton's method ([`scindo_algebra::solver::Newton`]) or for
 //! [`Relaxation`]; [`find_equilibrium`] minimises it by Newton's method.
 
 use nalgebra::Vector3;
-
-use crate::assembly::pressure::{Follower, Pressure};
-use crate::assembly::{BlockCsr, Model, Tangent};
-use crate::element::FixedCopy;
-use crate::solver::{Curvature, Newton, NewtonReport, Potential};
-use crate::team::Team;
+use scindo_algebra::assembly::pressure::{Follower, Pressure};
+use scindo_algebra::assembly::{BlockCsr, Model, Tangent};
+use scindo_algebra::solver::{Curvature, Newton, NewtonReport, Potential};
+use scindo_matter::element::FixedCopy;
+use scindo_matter::team::Team;
 
 /// Potential energy Π(x) = Ψ(x) − f·(x − X) of a model under dead loads, and pressure.
 #[derive(Clone, Debug)]

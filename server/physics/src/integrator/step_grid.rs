@@ -1,11 +1,14 @@
 //! Multigrid in a step by linear solves.
 
+use scindo_algebra::operator::{Block6, Inverse3, LinearOperator, Spring, Stiffness, invert};
+use scindo_algebra::solver::multigrid::{
+    CellMaterial, Coefficients, Cycle, CycleShape, Hierarchy, Multigrid,
+};
+use scindo_matter::material::Material;
+use scindo_matter::octree::Octree;
+use scindo_matter::team::Team;
+
 use super::step_inputs::LinearInputs;
-use crate::material::Material;
-use crate::octree::Octree;
-use crate::operator::{Block6, Inverse3, LinearOperator, Spring, Stiffness, invert};
-use crate::solver::multigrid::{CellMaterial, Coefficients, Cycle, CycleShape, Hierarchy, Multigrid};
-use crate::team::Team;
 
 /// If a spring is stiffer than this times the body at its point, all levels take the springs: corrections by levels
 /// without them would overshoot along it. Softer ones are on the finest level only.
@@ -170,7 +173,7 @@ fn compliance(spring: &Spring, inverse: impl Fn(usize) -> Inverse3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::MaterialPoint;
+    use scindo_matter::element::MaterialPoint;
 
     #[test]
     fn springs_raise_the_bound_by_no_more_than_they_can() {

@@ -1,17 +1,17 @@
 //! Inputs of a step, and what a step by linear solves adds to them.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::pressure::Pressure;
+use scindo_algebra::operator::ElasticUpdate;
+use scindo_algebra::solver::{LinearReport, PcgSettings};
+use scindo_matter::element::Points;
+use scindo_matter::element::{FixedCopy, Held};
+use scindo_matter::material::Material;
 
 use super::increment::Increment;
 use super::parts::LooseParts;
 use super::springs::{ActiveSpring, PointSpring};
 use super::state::State;
-use crate::assembly::pressure::Pressure;
-use crate::element::Points;
-use crate::element::{FixedCopy, Held};
-use crate::material::Material;
-use crate::operator::ElasticUpdate;
-use crate::solver::{LinearReport, PcgSettings};
 
 /// Inputs of one step.
 #[derive(Clone, Copy, Debug)]

@@ -4,6 +4,14 @@ use std::any::Any;
 use std::fmt::Debug;
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::{Model, ModelError};
+use scindo_algebra::operator::Stiffness;
+use scindo_algebra::solver::multigrid::{CoarsestSolve, CycleShape, LevelReport};
+use scindo_algebra::solver::{Method, NewtonSettings, PcgSettings};
+use scindo_matter::element::FixedCopy;
+use scindo_matter::element::Points;
+use scindo_matter::material::Material;
+use scindo_matter::team::Team;
 
 use super::course::Course;
 use super::notice::Notice;
@@ -12,15 +20,7 @@ use super::scheme::Scheme;
 use super::state::State;
 use super::step_inputs::StepInputs;
 use super::together::Member;
-use crate::assembly::{Model, ModelError};
-use crate::element::FixedCopy;
-use crate::element::Points;
-use crate::material::Material;
-use crate::operator::Stiffness;
-use crate::solver::multigrid::{CoarsestSolve, CycleShape, LevelReport};
-use crate::solver::{Method, NewtonSettings, PcgSettings};
 use crate::space::Space;
-use crate::team::Team;
 
 /// Solves the equations of one step, from the state before it. What all ways have in common (history,
 /// guards, energy balance, report) is in [`Dynamics`](super::Dynamics).

@@ -10,15 +10,15 @@ mod partners;
 mod translations;
 
 use nalgebra::{Matrix3, Vector3};
+use scindo_algebra::operator::Stiffness;
+use scindo_algebra::solver::{LinearReport, PcgSettings, StopReason};
+use scindo_matter::team::Team;
 
 use super::linear_step::LinearStep;
 use super::linear_step::together::Own;
 use super::pair_springs::{ActivePair, PairSpring, PairTerms};
 use super::state::State;
 use super::step_inputs::LinearInputs;
-use crate::operator::Stiffness;
-use crate::solver::{LinearReport, PcgSettings, StopReason};
-use crate::team::Team;
 use partners::Partners;
 use translations::SharedTranslations;
 

@@ -1,8 +1,7 @@
 //! Material points by their present positions.
 
 use nalgebra::{Matrix3, Vector3};
-
-use crate::element::MaterialPoint;
+use scindo_matter::element::MaterialPoint;
 
 /// A barycentric coordinate down to which a point still counts as inside.
 const INSIDE: f64 = -1e-6;

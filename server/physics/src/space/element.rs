@@ -6,16 +6,15 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::{Model, ModelError, Volumetric};
+use scindo_algebra::operator::StiffModes;
+use scindo_matter::cut::{CutMesh, NewCopy};
+use scindo_matter::element::ElementKind;
+use scindo_matter::element::{MaterialPoint, Point};
+use scindo_matter::material::{Material, Regions};
+use scindo_matter::mesh::TetMesh;
+use scindo_matter::octree::Octree;
 use smallvec::SmallVec;
-
-use crate::assembly::{Model, ModelError, Volumetric};
-use crate::cut::{CutMesh, NewCopy};
-use crate::element::ElementKind;
-use crate::element::{MaterialPoint, Point};
-use crate::material::{Material, Regions};
-use crate::mesh::TetMesh;
-use crate::octree::Octree;
-use crate::operator::StiffModes;
 
 /// A shape function below this is that of a node beside the face; the rest is rounding.
 const BESIDE: f64 = 1e-12;

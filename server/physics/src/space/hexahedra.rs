@@ -2,15 +2,15 @@
 //! not cut.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::{Model, ModelError, Volumetric};
+use scindo_matter::cut::{CutMesh, Piece};
+use scindo_matter::element::ElementKind;
+use scindo_matter::element::{MaterialPoint, Point, deformation_gradient, hex8, quadrature};
+use scindo_matter::material::Material;
+use scindo_matter::mesh::{HexMesh, TetMesh};
+use scindo_matter::octree::Octree;
 
 use super::element::Element;
-use crate::assembly::{Model, ModelError, Volumetric};
-use crate::cut::{CutMesh, Piece};
-use crate::element::ElementKind;
-use crate::element::{MaterialPoint, Point, deformation_gradient, hex8, quadrature};
-use crate::material::Material;
-use crate::mesh::{HexMesh, TetMesh};
-use crate::octree::Octree;
 
 /// Tetrahedra per hexahedron in [`HexMesh::to_tets`].
 const TETS_PER_HEX: usize = 6;

@@ -1,14 +1,14 @@
 //! Linear tetrahedra, cut or not: the copies are their only nodes.
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::{Model, ModelError, Volumetric};
+use scindo_matter::cut::CutMesh;
+use scindo_matter::element::ElementKind;
+use scindo_matter::element::{Point, deformation_gradient};
+use scindo_matter::material::Material;
+use scindo_matter::mesh::TetMesh;
 
 use super::element::Element;
-use crate::assembly::{Model, ModelError, Volumetric};
-use crate::cut::CutMesh;
-use crate::element::ElementKind;
-use crate::element::{Point, deformation_gradient};
-use crate::material::Material;
-use crate::mesh::TetMesh;
 
 /// Linear tetrahedra.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]

@@ -29,17 +29,19 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::assembly::{Model, ModelError, Volumetric};
-use crate::cut::{BladeSweep, Components, CutError, CutReport, Flaws, IncisionMark, Solid, Surface, Work};
-use crate::element::ElementKind;
-use crate::element::{MaterialPoint, Points, Simd};
-use crate::material::Material;
-use crate::mesh::MeshError;
-use crate::operator::{StiffModes, Stiffness};
-use crate::skin::{Kept, OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
-use crate::solver::multigrid::Hierarchy;
-use crate::storage::saved::saved_as;
-use crate::team::Team;
+use scindo_algebra::assembly::{Model, ModelError, Volumetric};
+use scindo_algebra::operator::{StiffModes, Stiffness};
+use scindo_algebra::solver::multigrid::Hierarchy;
+use scindo_matter::cut::{
+    BladeSweep, Components, CutError, CutReport, Flaws, IncisionMark, Solid, Surface, Work,
+};
+use scindo_matter::element::ElementKind;
+use scindo_matter::element::{MaterialPoint, Points, Simd};
+use scindo_matter::material::Material;
+use scindo_matter::mesh::MeshError;
+use scindo_matter::skin::{Kept, OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
+use scindo_matter::storage::saved::saved_as;
+use scindo_matter::team::Team;
 
 saved_as!(saved_space, Box, Space, Tets(Tets), Octree(OctreeSpace));
 saved_as!(saved_element, Arc, Element, Linear(LinearTets), Quadratic(QuadraticTets), Hexahedra(Hexahedra));
@@ -163,7 +165,7 @@ pub trait Space: Any + Points + Send + Sync {
     fn areas(&self, selected: &[bool]) -> Vec<f64>;
 
     /// Calls `visit` for every face of the skin all of whose nodes are `selected`, by node of the uncut body, as it is cut
-    /// now. The points are those of [`Pressure::add_face`](crate::assembly::pressure::Pressure::add_face). The faces of a
+    /// now. The points are those of [`Pressure::add_face`](scindo_algebra::assembly::pressure::Pressure::add_face). The faces of a
     /// cut face are its parts; lips of cuts are not skin. Without such faces a body takes no pressure.
     fn for_skin_faces(&self, _selected: &[bool], _visit: &mut dyn FnMut(&[MaterialPoint])) {}
 
@@ -176,7 +178,7 @@ pub trait Space: Any + Points + Send + Sync {
     }
 
     /// Calls `visit` for every part that fills the volume without overlap and moves with its own copies: the
-    /// [element](crate::element::Point::element) of its quadrature points, its copies, and ∫ N_a dV [m³]
+    /// [element](scindo_matter::element::Point::element) of its quadrature points, its copies, and ∫ N_a dV [m³]
     /// over it for each of them.
     fn for_pieces(&self, visit: &mut VisitPiece<'_>);
 

@@ -3,20 +3,20 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
-
-use super::{Space, Tets};
-use crate::assembly::{Model, Volumetric};
-use crate::cut::BladeSweep;
-use crate::element::quadrature::tet_degree_5;
-use crate::element::tet10;
-use crate::element::{FixedCopy, Held};
-use crate::integrator::{StaticProblem, find_equilibrium};
-use crate::material::{Law, Material, Rayleigh};
-use crate::mesh::{BoxPattern, TET_FACES, box_mesh};
-use crate::solver::{
+use scindo_algebra::assembly::{Model, Volumetric};
+use scindo_algebra::solver::{
     Curvature, LinearSettings, LinearSolver, Method, Newton, NewtonSettings, Precision, StopReason,
 };
-use crate::team::Team;
+use scindo_matter::cut::BladeSweep;
+use scindo_matter::element::quadrature::tet_degree_5;
+use scindo_matter::element::tet10;
+use scindo_matter::element::{FixedCopy, Held};
+use scindo_matter::material::{Law, Material, Rayleigh};
+use scindo_matter::mesh::{BoxPattern, TET_FACES, box_mesh};
+use scindo_matter::team::Team;
+
+use super::{Space, Tets};
+use crate::integrator::{StaticProblem, find_equilibrium};
 
 /// A plane through a block, tilted against all its axes.
 const NORMAL: Vector3<f64> = Vector3::new(0.21, 0.34, 1.0);
@@ -181,7 +181,7 @@ fn error_of_waves(cells: usize) -> (f64, u32, usize) {
         model.element(p).iter().zip(tet10::shape(&xi)).for_each(|(&n, N)| load[n as usize] += N * f);
     });
     let mut K = model.pattern();
-    model.tangent(model.rest(), crate::material::Tangent::Exact, &mut K);
+    model.tangent(model.rest(), scindo_matter::material::Tangent::Exact, &mut K);
     let mut u = vec![Vector3::zeros(); model.n_nodes()];
     fixed
         .iter()
@@ -283,7 +283,7 @@ fn iterations(cells: usize, normal: &Vector3<f64>, through: &Vector3<f64>) -> u3
     let fixed: Vec<FixedCopy> = (0..).zip(model.rest()).filter_map(held).collect();
     let load: Vec<Vector3<f64>> = model.shape_integrals().iter().map(|v| -*v * Vector3::z()).collect();
     let mut K = model.pattern();
-    model.tangent(model.rest(), crate::material::Tangent::Exact, &mut K);
+    model.tangent(model.rest(), scindo_matter::material::Tangent::Exact, &mut K);
     let (method, precision) = (Method::Pcg, Precision::Mixed);
     let settings = LinearSettings { method, precision, iterations: 20_000, tolerance: 1e-8 };
     let mut solver = LinearSolver::new(settings);

@@ -3,16 +3,16 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use scindo_algebra::assembly::{Model, ModelError, QuadraticPiece, Volumetric};
+use scindo_algebra::operator::StiffModes;
+use scindo_matter::cut::middles::MiddleCopies;
+use scindo_matter::cut::{CutMesh, NewCopy, Piece};
+use scindo_matter::element::ElementKind;
+use scindo_matter::element::{Point, TET_EDGES, deformation_gradient, piece_rule, quadrature, tet10};
+use scindo_matter::material::{Material, Regions};
+use scindo_matter::mesh::{Tet10Mesh, TetMesh};
 
 use super::element::Element;
-use crate::assembly::{Model, ModelError, QuadraticPiece, Volumetric};
-use crate::cut::middles::MiddleCopies;
-use crate::cut::{CutMesh, NewCopy, Piece};
-use crate::element::ElementKind;
-use crate::element::{Point, TET_EDGES, deformation_gradient, piece_rule, quadrature, tet10};
-use crate::material::{Material, Regions};
-use crate::mesh::{Tet10Mesh, TetMesh};
-use crate::operator::StiffModes;
 
 /// A corner counts as far from its copy's material below this mean of its linear shape function there.
 const FAR: f64 = 0.125;

@@ -4,25 +4,25 @@ use std::any::Any;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-
-use super::deepest::{self, Bounds, deepest_of};
-use super::{Element, Hexahedra, LinearTets, QuadraticTets, RestPoint, Space, VisitPiece};
-use crate::assembly::{Model, ModelError, Volumetric};
-use crate::cut::remesh::{Nodes, SnapCut, SnapReport, Snapper};
-use crate::cut::{
+use scindo_algebra::assembly::{Model, ModelError, Volumetric};
+use scindo_algebra::operator::cells::CellStiffness;
+use scindo_algebra::operator::{Elastic, StiffModes, Stiffness, degenerate_elements};
+use scindo_algebra::solver::multigrid::Hierarchy;
+use scindo_matter::cut::remesh::{Nodes, SnapCut, SnapReport, Snapper};
+use scindo_matter::cut::{
     BladeSweep, Components, CutError, CutLimits, CutMesh, CutReport, Flaws, FrontRule, IncisionMark, Piece,
     Solid, Surface, SweepUnderWay, Work, swept_area,
 };
-use crate::element::ElementKind;
-use crate::element::{MaterialPoint, Point, Points, Simd};
-use crate::material::{Lame, Material, Region, Regions, RegionsError};
-use crate::mesh::{HexMesh, MeshError, TetMesh};
-use crate::octree::Octree;
-use crate::operator::cells::CellStiffness;
-use crate::operator::{Elastic, StiffModes, Stiffness, degenerate_elements};
-use crate::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
-use crate::solver::multigrid::Hierarchy;
-use crate::team::Team;
+use scindo_matter::element::ElementKind;
+use scindo_matter::element::{MaterialPoint, Point, Points, Simd};
+use scindo_matter::material::{Lame, Material, Region, Regions, RegionsError};
+use scindo_matter::mesh::{HexMesh, MeshError, TetMesh};
+use scindo_matter::octree::Octree;
+use scindo_matter::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
+use scindo_matter::team::Team;
+
+use super::deepest::{self, Bounds, deepest_of};
+use super::{Element, Hexahedra, LinearTets, QuadraticTets, RestPoint, Space, VisitPiece};
 
 /// Distance, relative to the element, by which a point is moved towards its side before its piece is looked
 /// up. Far above rounding, far below any piece that can be seen.
@@ -586,7 +586,7 @@ fn barycentric(x: &[Vector3<f64>; 4], point: Vector3<f64>) -> [f64; 4] {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::mesh::{BoxPattern, box_hexes, box_mesh};
+    use scindo_matter::mesh::{BoxPattern, box_hexes, box_mesh};
 
     const SIZE: Vector3<f64> = Vector3::new(1.0, 2.0, 3.0);
 

@@ -9,11 +9,11 @@
 //! Bordas 2018.
 
 use nalgebra::{Matrix3, Vector3};
+use scindo_matter::element::{Points, quadrature};
+use scindo_matter::material::Material;
+use scindo_matter::octree::{Octree, corner_weights};
 
 use super::stress_recovery::{MeshError, cauchy, complementary};
-use crate::element::{Points, quadrature};
-use crate::material::Material;
-use crate::octree::{Octree, corner_weights};
 
 /// Recovers stress from cells. It reuses its memory from call to call.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]

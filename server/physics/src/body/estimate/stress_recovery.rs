@@ -12,9 +12,9 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
+use scindo_matter::material::{Lame, Law};
 
 use super::tets::Tets;
-use crate::material::{Lame, Law};
 
 /// Estimate of the discretisation error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]

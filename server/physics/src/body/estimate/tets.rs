@@ -1,12 +1,11 @@
 //! The linear tetrahedra from which stress is recovered: those of a model, or the pieces of a body.
 
 use nalgebra::Vector3;
-
-use crate::assembly::Model;
-use crate::cut::Piece;
-use crate::element::ElementKind;
-use crate::material::{Lame, Regions};
-use crate::mesh::TetMesh;
+use scindo_algebra::assembly::Model;
+use scindo_matter::cut::Piece;
+use scindo_matter::element::ElementKind;
+use scindo_matter::material::{Lame, Regions};
+use scindo_matter::mesh::TetMesh;
 
 /// Linear tetrahedra whose corners are copies.
 pub trait Tets {

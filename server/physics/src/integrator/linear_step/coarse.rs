@@ -1,10 +1,11 @@
 //! The coarse space of the two-level preconditioner in a step.
 
+use scindo_algebra::operator::BlockJacobi;
+use scindo_algebra::solver::Method;
+use scindo_algebra::solver::two_level::{CoarseSpace, CoarseSystem, TwoLevel};
+
 use super::LinearStep;
 use crate::integrator::step_inputs::LinearInputs;
-use crate::operator::BlockJacobi;
-use crate::solver::Method;
-use crate::solver::two_level::{CoarseSpace, CoarseSystem, TwoLevel};
 
 impl LinearStep {
     /// Brings the coarse space up to date with the operator, and makes it if the method asks for one that there is not.

@@ -2,15 +2,15 @@
 //! laws that rotate.
 
 use nalgebra::Vector3;
+use scindo_algebra::operator::Stiffness;
+use scindo_algebra::solver::{LinearReport, StopReason};
+use scindo_matter::team::Team;
+use scindo_matter::team::phase::Phase;
 
 use super::{LinearStep, active, system};
 use crate::integrator::descent::Start;
 use crate::integrator::state::State;
 use crate::integrator::step_inputs::{LinearInputs, StepOutcome};
-use crate::operator::Stiffness;
-use crate::solver::{LinearReport, StopReason};
-use crate::team::Team;
-use crate::team::phase::Phase;
 
 impl LinearStep {
     /// Whether nothing has changed from outside since the last step.

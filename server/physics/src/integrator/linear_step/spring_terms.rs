@@ -1,12 +1,12 @@
 //! Springs in the operator of a step, and the modes in which a solve takes them.
 
 use super::{LinearStep, SPRING_PASSES, system};
-use crate::element::MaterialPoint;
 use crate::integrator::active_springs::make_room;
 use crate::integrator::springs::ActiveSpring;
 use crate::integrator::step_inputs::LinearInputs;
-use crate::operator::{Block6, Spring, Stiffness};
 use nalgebra::Matrix3;
+use scindo_algebra::operator::{Block6, Spring, Stiffness};
+use scindo_matter::element::MaterialPoint;
 
 /// A spring on one node, to see on which nodes it acts in other variables.
 fn at_node(copy: u32) -> Spring {

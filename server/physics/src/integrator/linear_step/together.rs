@@ -1,12 +1,12 @@
 //! The parts of a step that a body makes when it is solved together with others.
 
 use nalgebra::{Matrix3, Vector3};
+use scindo_algebra::operator::{Padded, Stiffness, filter};
+use scindo_matter::team::Team;
 
 use super::{LinearStep, system};
 use crate::integrator::state::State;
 use crate::integrator::step_inputs::LinearInputs;
-use crate::operator::{Padded, Stiffness, filter};
-use crate::team::Team;
 
 /// A body's own part of a step that several bodies solve together.
 pub struct Own<'a, 'b> {
@@ -115,7 +115,7 @@ impl LinearStep {
     pub fn descend_together(&mut self, own: &mut Own<'_, '_>, alpha: f64) -> f64 {
         let Self { pcg, preconditioner, terms, delta, .. } = self;
         filter(own.inputs.step.fixed, &mut pcg.q);
-        crate::operator::Preconditioner::enter(preconditioner, &mut pcg.q);
+        scindo_algebra::operator::Preconditioner::enter(preconditioner, &mut pcg.q);
         let mut A = system(&mut *own.elastic, terms, own.inputs);
         pcg.descend(own.team, &mut A, preconditioner, alpha, delta)
     }

@@ -1,9 +1,10 @@
 //! Refinement and coarsening of the octree of a body.
 
+use scindo_matter::cut::{Front, NewCopy};
+use scindo_matter::element::MaterialPoint;
+use scindo_matter::octree::{Activity, AdaptSettings, Coarsening, Family, OctreeChange, Plan};
+
 use super::OctreeSpace;
-use crate::cut::{Front, NewCopy};
-use crate::element::MaterialPoint;
-use crate::octree::{Activity, AdaptSettings, Coarsening, Family, OctreeChange, Plan};
 
 /// What a refinement did.
 #[derive(Clone, Debug, Default, PartialEq)]

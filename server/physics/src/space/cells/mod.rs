@@ -11,24 +11,26 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::assembly::{Model, ModelError, Volumetric};
-use crate::cut::{
+use crate::space::deepest::{Bounds, deepest_of};
+use crate::space::{RestPoint, Space, VisitPiece};
+use scindo_algebra::assembly::{Model, ModelError, Volumetric};
+use scindo_algebra::operator::cells::CellStiffness;
+use scindo_algebra::operator::{StiffModes, Stiffness};
+use scindo_algebra::solver::multigrid::Hierarchy;
+use scindo_matter::cut::{
     BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Solid, Surface,
     Surroundings, Work, sweep_from_behind, swept_area,
 };
-use crate::element::ElementKind;
-use crate::element::{MaterialPoint, Point, Points, Simd};
-use crate::material::{Lame, Material, Region};
-use crate::mesh::MeshError;
-use crate::octree::near::{LeafRuns, VertexBoxes};
-use crate::octree::{CutLink, LinkKey, OUTSIDE, Octree, OctreeChange, OctreeSurface, OwnSkin, swept_box};
-use crate::operator::cells::CellStiffness;
-use crate::operator::{StiffModes, Stiffness};
-use crate::skin::{Kept, OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
-use crate::solver::multigrid::Hierarchy;
-use crate::space::deepest::{Bounds, deepest_of};
-use crate::space::{RestPoint, Space, VisitPiece};
-use crate::team::Team;
+use scindo_matter::element::ElementKind;
+use scindo_matter::element::{MaterialPoint, Point, Points, Simd};
+use scindo_matter::material::{Lame, Material, Region};
+use scindo_matter::mesh::MeshError;
+use scindo_matter::octree::near::{LeafRuns, VertexBoxes};
+use scindo_matter::octree::{
+    CutLink, LinkKey, OUTSIDE, Octree, OctreeChange, OctreeSurface, OwnSkin, swept_box,
+};
+use scindo_matter::skin::{Kept, OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
+use scindo_matter::team::Team;
 
 /// Most leaves that cuts by clients may make of one.
 const MOST_GROWTH: usize = 8;

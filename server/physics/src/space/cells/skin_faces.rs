@@ -3,9 +3,10 @@
 //! They are steps where the boundary is inclined. The vector area Σ n A of steps is that of the surface between the same
 //! rims, so the resultant of a pressure is that on the surface, and its distribution is known to a cell.
 
+use scindo_matter::element::MaterialPoint;
+use scindo_matter::octree::{FACES, corner_weights};
+
 use super::OctreeSpace;
-use crate::element::MaterialPoint;
-use crate::octree::{FACES, corner_weights};
 
 /// Corners of the face in direction `d`, counter-clockwise from outside.
 fn around(d: usize) -> [usize; 4] {

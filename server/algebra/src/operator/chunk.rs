@@ -1,0 +1,324 @@
+//! One chunk of the stiffness: the lanes of the pieces of one group, their local vectors, and how
+//! they follow a cut.
+
+use nalgebra::{Matrix3, Vector3};
+use scindo_matter::element::{LANES, Simd};
+use scindo_matter::mesh::TetMesh;
+use scindo_matter::storage::numbering::Numbering;
+use scindo_matter::storage::reserve::resize_reserving;
+
+use super::chunks::{NO_PIECE, pack, plan_chunk};
+use super::edges::EdgeBlocks;
+use super::kernel::Batches;
+use super::shared_lanes::Merged;
+use super::strips::{AS_IN_MESH, Corners, corners_of};
+use super::tet_batch::{Block6, Coefficients, EnergyCoefficients, Locals, RestBatch};
+use super::{Padded, padded};
+
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Chunk {
+    /// Group of its elements.
+    pub group: usize,
+    /// Numbers of lanes and copies when the chunk was planned; `n_lanes` is the present number.
+    planned: [usize; 2],
+    n_lanes: usize,
+    /// Copy of every local number, ascending. The last local number is the waste bin of unused lanes.
+    pub copies: Vec<u32>,
+    pieces: Vec<[u32; LANES]>,
+    /// Order of the corners in every lane of the batches of strips, which come first.
+    corners: Vec<[Corners; LANES]>,
+    batches: Batches,
+    positions: Vec<[f64; 4]>,
+    /// Vector that the stiffness is applied to, by local number.
+    pub x: Vec<Padded>,
+    /// Rest positions [m].
+    rest: Vec<Vector3<f64>>,
+    /// The assembled stiffness, if it is in use.
+    edges: Option<EdgeBlocks>,
+    /// Lanes (batch, lane) that have changed since it was assembled.
+    unassembled: Vec<[usize; 2]>,
+    /// Pieces with det F ≤ 0 at the last update.
+    pub inverted: usize,
+    /// Energy [J] when it was last asked for.
+    pub energy: f64,
+    /// Whether the chunk was planned or amended since the last update.
+    pub stale: bool,
+    /// First row of its sums among those of all chunks.
+    pub first_row: usize,
+}
+
+/// A carrier (a piece that gets a lane), and the rotation to start with.
+#[derive(Clone, Copy, Debug)]
+pub struct NewLane {
+    /// Index of the carrier.
+    pub piece: u32,
+    /// Rotation R that its lane starts with.
+    pub rotation: Matrix3<f32>,
+}
+
+impl Chunk {
+    /// Arranges the carriers `members` (ascending) in batches.
+    pub fn new(group: usize, members: &[NewLane], mesh: &TetMesh, merged: &[Merged]) -> Self {
+        let pieces: Vec<u32> = members.iter().map(|lane| lane.piece).collect();
+        let plan = plan_chunk(&pieces, |p| merged[p as usize].piece.copies);
+        // Spare capacity for what cuts add before the next plan.
+        let mut rest = Vec::with_capacity(plan.pieces.len() + plan.pieces.len() / 4 + 1);
+        for (b, lanes) in plan.pieces.iter().enumerate() {
+            let mut batch = RestBatch::empty();
+            for (lane, &p) in lanes.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
+                let rotation = pieces.binary_search(&p).ok().map(|at| &members[at].rotation);
+                let corners = corners_of(&plan.corners, b, lane);
+                batch.set(lane, mesh, (&merged[p as usize], corners), rotation);
+            }
+            rest.push(batch);
+        }
+        let n = plan.copies.len() + 1;
+        let (mut x, mut positions) = (Vec::new(), Vec::new());
+        resize_reserving(&mut x, n, [0.0; 4]);
+        resize_reserving(&mut positions, n, [0.0; 4]);
+        Self {
+            group,
+            batches: Batches::new(&plan.nodes, rest, n, plan.corners.len()),
+            corners: plan.corners,
+            pieces: plan.pieces,
+            rest: rest_positions(&plan.copies, &pieces, mesh, merged),
+            edges: None,
+            unassembled: Vec::new(),
+            planned: [members.len(), plan.copies.len()],
+            n_lanes: members.len(),
+            copies: plan.copies,
+            positions,
+            x,
+            inverted: 0,
+            energy: 0.0,
+            stale: true,
+            first_row: 0,
+        }
+    }
+
+    /// Carrier, batch and lane of all lanes in use.
+    pub fn lanes(&self) -> impl Iterator<Item = (u32, usize, usize)> + '_ {
+        let lanes = self.pieces.iter().enumerate();
+        let lanes = lanes.flat_map(|(b, lanes)| lanes.iter().enumerate().map(move |(l, &p)| (p, b, l)));
+        lanes.filter(|&(p, ..)| p != NO_PIECE)
+    }
+
+    /// All lanes in use with their rotations, to be arranged anew.
+    pub fn new_lanes(&self) -> impl Iterator<Item = NewLane> + '_ {
+        self.lanes().map(|(piece, b, l)| NewLane { piece, rotation: self.rotation(b, l) })
+    }
+
+    /// Rotation of a lane at the last update.
+    pub fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
+        let rotation = &self.batches.rest()[batch].rotation;
+        Matrix3::from_fn(|i, j| rotation[3 * i + j].0[lane])
+    }
+
+    /// Amends copies and fractions of the carriers marked in `is_amended`, and gives the `added` ones
+    /// lanes. Copies new to the chunk are new to the body, so `copies` stays in order. Returns `false`
+    /// and does nothing if the chunk has grown so much that packing and numbering it anew pays.
+    pub fn follow(
+        &mut self,
+        mesh: &TetMesh,
+        merged: &[Merged],
+        is_amended: &[bool],
+        added: &[NewLane],
+        numbering: &mut Numbering,
+    ) -> bool {
+        let amended: Vec<(u32, usize, usize)> =
+            self.lanes().filter(|&(p, ..)| is_amended[p as usize]).collect();
+        let known = self.copies.len();
+        numbering.note(&self.copies, 0);
+        // Copies that are new to the chunk, and their nodes.
+        let mut new: Vec<(u32, u32)> = Vec::new();
+        for p in amended.iter().map(|lane| lane.0).chain(added.iter().map(|lane| lane.piece)) {
+            let piece = &merged[p as usize].piece;
+            let held = piece.copies.into_iter().zip(mesh.tets[piece.element as usize]);
+            new.extend(held.filter(|&(copy, _)| numbering.insert(&mut self.copies, copy)));
+        }
+        // They were appended only to be numbered; a refusal must leave no trace.
+        self.copies.truncate(known);
+        let [planned_lanes, planned_copies] = self.planned;
+        let n_copies = known + new.len();
+        if self.n_lanes + added.len() > planned_lanes + planned_lanes / 4
+            || n_copies > planned_copies + planned_copies / 2
+        {
+            return false;
+        }
+        new.sort_unstable();
+        self.copies.extend(new.iter().map(|n| n.0));
+        self.rest.extend(new.iter().map(|n| mesh.nodes[n.1 as usize]));
+        debug_assert!(self.copies.is_sorted());
+        numbering.note(&self.copies, known);
+        let n = n_copies + 1;
+        let copies = &self.copies;
+        let locals = |p: u32| {
+            let local = |copy| numbering.find(copies, copy).unwrap_or(n - 1) as u16;
+            merged[p as usize].piece.copies.map(local)
+        };
+        let held: Vec<[u16; 4]> = added.iter().map(|new| locals(new.piece)).collect();
+        let places = free_lanes(&mut self.pieces, added, &held, n);
+        self.batches.grow(self.pieces.len(), n);
+        for (p, batch, lane) in amended {
+            let (ids, corners) = (locals(p), corners_of(&self.corners, batch, lane));
+            self.batches.set_nodes(batch, lane, corners.map(|c| ids[c as usize]));
+            self.batches.rest_mut(batch).set_volume(lane, mesh, &merged[p as usize]);
+            self.unassembled.push([batch, lane]);
+        }
+        for (([batch, lane], ids), NewLane { piece, rotation }) in places.into_iter().zip(held).zip(added) {
+            self.batches.set_nodes(batch, lane, ids);
+            self.batches.rest_mut(batch).set(
+                lane,
+                mesh,
+                (&merged[*piece as usize], AS_IN_MESH),
+                Some(rotation),
+            );
+            self.unassembled.push([batch, lane]);
+        }
+        self.n_lanes += added.len();
+        self.stale = true;
+        self.positions.resize(n, [0.0; 4]);
+        self.x.resize(n, [0.0; 4]);
+        true
+    }
+
+    /// Bytes of stiffness that one application streams.
+    pub fn bytes(&self) -> usize {
+        self.edges.as_ref().map_or_else(|| self.batches.bytes(), EdgeBlocks::bytes)
+    }
+
+    /// Number of lanes in use.
+    pub fn n_lanes(&self) -> usize {
+        self.n_lanes
+    }
+
+    /// Assembles the stiffness of the last update, or drops the assembled one if it is not `wanted`.
+    pub fn assemble(&mut self, wanted: bool) {
+        let Self { edges, batches, unassembled, .. } = self;
+        match edges {
+            _ if !wanted => *edges = None,
+            None => edges.insert(EdgeBlocks::new(batches)).assemble(batches),
+            Some(edges) => {
+                if !unassembled.is_empty() {
+                    edges.follow(batches, unassembled.iter().copied());
+                }
+                edges.assemble(batches);
+            }
+        }
+        unassembled.clear();
+    }
+
+    /// The part of its rows that the chunk uses.
+    fn used<'a, T>(&self, rows: &'a mut [T]) -> &'a mut [T] {
+        &mut rows[..self.x.len()]
+    }
+
+    /// Asks for the stiffness that [`Self::apply`] reads first, before x is gathered.
+    #[inline(always)]
+    pub fn ask_for_stiffness(&self) {
+        if self.edges.is_none() {
+            self.batches.ask_for_first();
+        }
+    }
+
+    /// y = s K̂ x; `y` may have more rows than the chunk uses.
+    #[inline(always)]
+    pub fn apply(&self, simd: Simd, y: &mut [Padded]) {
+        let y = self.used(y);
+        y.fill([0.0; 4]);
+        match &self.edges {
+            Some(edges) => edges.apply(simd, &self.x, y),
+            None => self.batches.apply(simd, &self.x, y),
+        }
+    }
+
+    /// y = K̂ u with displacements u relative to the chunk's first copy, subtracted in double
+    /// precision: the error is relative to the chunk, not to how far the body has moved.
+    pub fn linear_forces(&mut self, simd: Simd, scale: f32, positions: &[Vector3<f64>], y: &mut [Padded]) {
+        let displacement = |copy: u32, rest: &Vector3<f64>| positions[copy as usize] - rest;
+        let held = self.copies.iter().zip(&self.rest);
+        let origin =
+            held.clone().next().map_or_else(Vector3::zeros, |(&copy, rest)| displacement(copy, rest));
+        for (local, (&copy, rest)) in self.x.iter_mut().zip(held) {
+            *local = padded(&(displacement(copy, rest) - origin));
+        }
+        let y = self.used(y);
+        self.apply(simd, y);
+        let factor = 1.0 / scale;
+        for f in y.iter_mut().flatten() {
+            *f *= factor;
+        }
+    }
+
+    /// Updates rotations, gradients, internal forces `f` and diagonal blocks.
+    pub fn update(
+        &mut self,
+        simd: Simd,
+        c: &Coefficients,
+        positions: &[Vector3<f64>],
+        f: &mut [Padded],
+        diagonal: &mut [Block6],
+    ) {
+        for (local, &copy) in self.positions.iter_mut().zip(&self.copies) {
+            let x = &positions[copy as usize];
+            *local = [x.x, x.y, x.z, 0.0];
+        }
+        let (f, diagonal) = (self.used(f), self.used(diagonal));
+        f.fill([0.0; 4]);
+        diagonal.fill([0.0; 8]);
+        let mut locals = Locals { x: &self.positions, f, blocks: diagonal };
+        self.inverted = self.batches.update(simd, c, &mut locals);
+        self.stale = false;
+    }
+
+    /// Computes the energy with the rotations of the last update.
+    pub fn find_energy(&mut self, simd: Simd, c: EnergyCoefficients, positions: &[Vector3<f64>]) {
+        let held = self.copies.iter().zip(&self.rest);
+        for (local, (&copy, rest)) in self.positions.iter_mut().zip(held) {
+            let u = positions[copy as usize] - rest;
+            *local = [u.x, u.y, u.z, 0.0];
+        }
+        self.energy = self.batches.energy(simd, c, &self.positions);
+    }
+}
+
+/// Gives the carriers `added` lanes: first those that are empty (only the last batch has any), then new
+/// batches. `held` are the local numbers of their copies, below `n_locals`. Returns batch and lane of each.
+fn free_lanes(
+    batches: &mut Vec<[u32; LANES]>,
+    added: &[NewLane],
+    held: &[[u16; 4]],
+    n_locals: usize,
+) -> Vec<[usize; 2]> {
+    let mut places = Vec::with_capacity(added.len());
+    let last = batches.len().saturating_sub(1);
+    let empty = batches.last_mut().into_iter().flatten().enumerate().filter(|(_, p)| **p == NO_PIECE);
+    for ((l, lane), new) in empty.zip(added) {
+        *lane = new.piece;
+        places.push([last, l]);
+    }
+    let first = places.len();
+    places.resize(added.len(), [0; 2]);
+    for mut lanes in pack(&held[first..], n_locals) {
+        for (l, lane) in lanes.iter_mut().enumerate().filter(|(_, p)| **p != NO_PIECE) {
+            let k = first + *lane as usize;
+            places[k] = [batches.len(), l];
+            *lane = added[k].piece;
+        }
+        batches.push(lanes);
+    }
+    places
+}
+
+/// Rest position of each of `copies` (ascending), all of which belong to pieces in `members`.
+fn rest_positions(copies: &[u32], members: &[u32], mesh: &TetMesh, merged: &[Merged]) -> Vec<Vector3<f64>> {
+    let mut rest = vec![Vector3::zeros(); copies.len()];
+    for piece in members.iter().map(|&p| &merged[p as usize].piece) {
+        for (copy, &node) in piece.copies.iter().zip(&mesh.tets[piece.element as usize]) {
+            if let Ok(local) = copies.binary_search(copy) {
+                rest[local] = mesh.nodes[node as usize];
+            }
+        }
+    }
+    rest
+}

@@ -1,0 +1,353 @@
+//! The two loops over pieces that a step spends its time in: [`Batches::update`] once,
+//! [`Batches::apply`] once per solver iteration.
+
+#![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
+
+use scindo_matter::element::{Batched, Ids, LANES, Lanes, Simd, Vector8, prefetch, prefetch_at};
+
+use super::tet_batch::{Batch, Coefficients, EnergyCoefficients, Locals, RestBatch};
+use super::tet_lanes::{
+    Three, UpdatedTet, edges, forces, load, read, scatter_block, sum_of_outer_products, tet_edges, update_tet,
+};
+use super::{Padded, strip_kernel};
+
+/// Tets that are in no strip are asked for so many turns ahead; see [`strip_kernel::AHEAD`].
+const AHEAD: usize = 4;
+
+/// The batches of one chunk. Their local numbers are checked once, here.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Batches {
+    /// Those of strips first.
+    live: Vec<Batch>,
+    rest: Vec<RestBatch>,
+    /// For every six batches of strips, whether their tets still have faces in common.
+    joined: Vec<bool>,
+    /// λ/2μ at the last update.
+    ratio: f32,
+    /// Length of the local vectors, the waste bin included.
+    n_locals: usize,
+}
+
+impl Batches {
+    /// Batches with the local numbers `nodes`, all below `n_locals`, and their rest states. The first `n_in_strips` of
+    /// them, a multiple of [`strip_kernel::BATCHES`], make up strips.
+    pub fn new(nodes: &[[Ids; 4]], rest: Vec<RestBatch>, n_locals: usize, n_in_strips: usize) -> Self {
+        assert_eq!(nodes.len(), rest.len());
+        assert!(nodes.iter().flatten().flatten().all(|&id| (id as usize) < n_locals));
+        let zero = Lanes::default();
+        let mut live = Vec::with_capacity(rest.capacity());
+        live.extend(nodes.iter().map(|&nodes| Batch { g: [[zero; 3]; 3], nodes }));
+        let joined = live[..n_in_strips].as_chunks().0.iter().map(strip_kernel::is_joined).collect();
+        Self { live, rest, joined, ratio: 0.0, n_locals }
+    }
+
+    /// Grows to `n_batches` batches, the new ones empty, and to local numbers below `n_locals`. The last
+    /// local number becomes the waste bin.
+    pub fn grow(&mut self, n_batches: usize, n_locals: usize) {
+        assert!(n_batches >= self.live.len() && n_locals >= self.n_locals);
+        let [before, waste] = [self.n_locals, n_locals].map(|n| (n - 1) as u16);
+        for id in self.live.iter_mut().flat_map(|b| b.nodes.as_flattened_mut()).filter(|id| **id == before) {
+            *id = waste;
+        }
+        let empty = Batch { g: [[Lanes::default(); 3]; 3], nodes: [[waste; LANES]; 4] };
+        self.live.resize(n_batches, empty);
+        self.rest.resize(n_batches, RestBatch::empty());
+        self.n_locals = n_locals;
+    }
+
+    /// Gives one lane other local numbers.
+    pub fn set_nodes(&mut self, batch: usize, lane: usize, ids: [u16; 4]) {
+        assert!(ids.iter().all(|&id| (id as usize) < self.n_locals));
+        for (nodes, id) in self.live[batch].nodes.iter_mut().zip(ids) {
+            nodes[lane] = id;
+        }
+        let strip = batch / strip_kernel::BATCHES;
+        if let (Some(joined), Some(batches)) =
+            (self.joined.get_mut(strip), self.live.as_chunks().0.get(strip))
+        {
+            *joined = strip_kernel::is_joined(batches);
+        }
+    }
+
+    /// The rest state of one batch.
+    pub fn rest_mut(&mut self, batch: usize) -> &mut RestBatch {
+        &mut self.rest[batch]
+    }
+
+    /// λ/2μ at the last update.
+    pub fn ratio(&self) -> f32 {
+        self.ratio
+    }
+
+    /// Gradients √(2μ w V s) R g_a and local numbers of the four corners of one lane.
+    pub fn gradients(&self, batch: usize, lane: usize) -> ([[f32; 3]; 4], [u16; 4]) {
+        let b = &self.live[batch];
+        let g: [[f32; 3]; 3] = [0, 1, 2].map(|k| [0, 1, 2].map(|i| b.g[k][i].0[lane]));
+        let g0 = [0, 1, 2].map(|i| -(g[0][i] + g[1][i] + g[2][i]));
+        ([g0, g[0], g[1], g[2]], [0, 1, 2, 3].map(|a| b.nodes[a][lane]))
+    }
+
+    /// Local numbers of the four corners of one lane.
+    pub fn ids(&self, batch: usize, lane: usize) -> [u16; 4] {
+        self.live[batch].nodes.each_ref().map(|ids| ids[lane])
+    }
+
+    /// Number of batches.
+    pub fn n_batches(&self) -> usize {
+        self.live.len()
+    }
+
+    /// Local numbers are below this; the last is the waste bin.
+    pub fn n_locals(&self) -> usize {
+        self.n_locals
+    }
+
+    /// Bytes that one application streams.
+    pub fn bytes(&self) -> usize {
+        self.live.len() * size_of::<Batch>()
+    }
+
+    /// Asks for what [`Self::apply`] reads first.
+    #[inline(always)]
+    pub fn ask_for_first(&self) {
+        let n = strip_kernel::AHEAD * strip_kernel::BATCHES;
+        prefetch(self.live.get(..n).unwrap_or(&self.live));
+    }
+
+    /// Rest states and rotations.
+    pub fn rest(&self) -> &[RestBatch] {
+        &self.rest
+    }
+
+    /// y += s K̂ x. `x` and `y` have one entry per local number and the waste bin.
+    pub fn apply(&self, simd: Simd, x: &[Padded], y: &mut [Padded]) {
+        assert!(x.len() == self.n_locals && y.len() == self.n_locals);
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: these come from `Simd::detect` only.
+            Simd::Avx2 => unsafe { avx2::apply(self, x, y) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Simd::Avx512 => unsafe { avx512::apply(self, x, y) },
+            _ => apply_all::<Lanes, 1>(self, x, y),
+        }
+    }
+
+    /// Computes rotations, internal forces, rotated gradients and diagonal blocks at the positions in
+    /// `locals`. Returns the number of pieces with det F ≤ 0.
+    pub fn update(&mut self, simd: Simd, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+        let n = self.n_locals;
+        self.ratio = 0.5 * c.lambda / c.mu;
+        assert!(locals.x.len() == n && locals.f.len() == n && locals.blocks.len() == n);
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: these come from `Simd::detect` only.
+            Simd::Avx2 => unsafe { avx2::update(self, c, locals) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Simd::Avx512 => unsafe { avx512::update(self, c, locals) },
+            _ => update_all::<Lanes, 1>(self, c, locals),
+        }
+    }
+
+    /// Elastic energy [J] at the displacements `u` [m], one per local number, with the rotations of the last
+    /// update.
+    pub fn energy(&self, simd: Simd, c: EnergyCoefficients, u: &[[f64; 4]]) -> f64 {
+        assert!(u.len() == self.n_locals);
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: both come from `Simd::detect` only.
+            Simd::Avx2 | Simd::Avx512 => unsafe { avx2::energy(c, &self.rest, &self.live, u) },
+            _ => energy_with::<Lanes>(c, &self.rest, &self.live, u),
+        }
+    }
+}
+
+// Loops instead of closures below: see `Vector`. Closures that only name a field are none of those.
+
+/// y += s K̂ x for tets that are in no strip.
+#[inline(always)]
+fn apply_with<V: Batched<N>, const N: usize>(
+    batches: &[[Batch; N]],
+    ratio: f32,
+    x: &[Padded],
+    y: &mut [Padded],
+) {
+    let ratio = V::splat(ratio);
+    for (k, b) in batches.iter().enumerate() {
+        prefetch_at(batches, k + AHEAD);
+        // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+        let u = unsafe {
+            [
+                V::gather_all(x, b, |b| &b.nodes[0]),
+                V::gather_all(x, b, |b| &b.nodes[1]),
+                V::gather_all(x, b, |b| &b.nodes[2]),
+                V::gather_all(x, b, |b| &b.nodes[3]),
+            ]
+        };
+        let f = forces(&read(b, |b| &b.g), &edges(u[0], u[1], u[2], u[3]), ratio);
+        scatter_forces(y, b, &f);
+    }
+}
+
+#[inline(always)]
+fn scatter_forces<V: Batched<N>, const N: usize>(y: &mut [Padded], b: &[Batch; N], f: &[Three<V>; 4]) {
+    // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+    unsafe { V::scatter_all(y, |batch| b[batch].nodes.each_ref(), f) };
+}
+
+/// Updates tets that are in no strip.
+#[inline(always)]
+fn update_with<V: Batched<N>, const N: usize>(
+    c: &Coefficients,
+    rest: &mut [[RestBatch; N]],
+    live: &mut [[Batch; N]],
+    locals: &mut Locals<'_>,
+) -> usize {
+    let mut inverted = 0;
+    for (rest, live) in rest.iter_mut().zip(live) {
+        let found: UpdatedTet<V> = update_tet(c, &tet_edges(locals.x, live), rest, live);
+        inverted += found.inverted;
+        scatter_forces(locals.f, live, &found.f);
+        for batch in 0..N {
+            for k in 0..4 {
+                scatter_block(locals.blocks, &live[batch].nodes[k], &found.blocks[k], batch);
+            }
+        }
+    }
+    inverted
+}
+
+/// y += s K̂ x, as many batches at once as V holds; one that is left over alone.
+#[inline(always)]
+fn apply_all<V: Batched<N>, const N: usize>(of: &Batches, x: &[Padded], y: &mut [Padded]) {
+    let (strips, single) = of.live.split_at(strip_kernel::BATCHES * of.joined.len());
+    let strips: &[[Batch; strip_kernel::BATCHES]] = strips.as_chunks().0;
+    for (k, (strip, &joined)) in strips.iter().zip(&of.joined).enumerate() {
+        match joined {
+            true => {
+                let soon = strips.get(k + strip_kernel::AHEAD).unwrap_or(strip);
+                strip_kernel::apply::<V, N>([strip, soon], of.ratio, x, y);
+            }
+            false => apply_with::<V, N>(strip.as_chunks().0, of.ratio, x, y),
+        }
+    }
+    let (whole, last) = single.as_chunks();
+    apply_with::<V, N>(whole, of.ratio, x, y);
+    apply_with::<V::Part, 1>(last.as_chunks().0, of.ratio, x, y);
+}
+
+/// Updates them in the same way.
+#[inline(always)]
+fn update_all<V: Batched<N>, const N: usize>(
+    of: &mut Batches,
+    c: &Coefficients,
+    locals: &mut Locals<'_>,
+) -> usize {
+    let n = strip_kernel::BATCHES * of.joined.len();
+    let ((strips, single), (strips_rest, single_rest)) = (of.live.split_at_mut(n), of.rest.split_at_mut(n));
+    let strips = strips.as_chunks_mut().0.iter_mut().zip(strips_rest.as_chunks_mut().0);
+    let mut inverted = 0;
+    for ((live, rest), &joined) in strips.zip(&of.joined) {
+        inverted += match joined {
+            true => strip_kernel::update::<V, N>(c, rest, live, locals),
+            false => update_with::<V, N>(c, rest.as_chunks_mut().0, live.as_chunks_mut().0, locals),
+        };
+    }
+    let ((whole, last), (whole_rest, last_rest)) = (single.as_chunks_mut(), single_rest.as_chunks_mut());
+    inverted
+        + update_with::<V, N>(c, whole_rest, whole, locals)
+        + update_with::<V::Part, 1>(c, last_rest.as_chunks_mut().0, last.as_chunks_mut().0, locals)
+}
+
+/// Σ w V (μ |D|² + λ/2 (R : D)²), where D = F − R, or sym(F) − I without rotations. F is I plus the gradient of
+/// the displacement, so that the error of D is relative to D where little turns.
+#[inline(always)]
+fn energy_with<V: Vector8>(c: EnergyCoefficients, rest: &[RestBatch], live: &[Batch], u: &[[f64; 4]]) -> f64 {
+    let (one, half) = (V::splat(1.0), V::splat(0.5));
+    let (mu, half_lambda) = (V::splat(c.mu), V::splat(0.5 * c.lambda));
+    let mut sums = [0.0; LANES];
+    for (rest, live) in rest.iter().zip(live) {
+        let g: [[V; 3]; 3] = [load(&rest.g[0]), load(&rest.g[1]), load(&rest.g[2])];
+        let nodes = &live.nodes;
+        // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+        let e: [[V; 3]; 3] = unsafe {
+            [
+                V::gather_edges(u, &nodes[0], &nodes[1]),
+                V::gather_edges(u, &nodes[0], &nodes[2]),
+                V::gather_edges(u, &nodes[0], &nodes[3]),
+            ]
+        };
+        let mut D = sum_of_outer_products(&e, &g);
+        let (square, trace);
+        if c.rotates {
+            let (mut sum, mut along) = (V::splat(0.0), V::splat(0.0));
+            for i in 0..3 {
+                for j in 0..3 {
+                    let R = V::load(&rest.rotation[3 * i + j]);
+                    let unit = if i == j { one - R } else { -R };
+                    D[i][j] = D[i][j] + unit;
+                    sum = D[i][j].mul_add(D[i][j], sum);
+                    along = D[i][j].mul_add(R, along);
+                }
+            }
+            (square, trace) = (sum, along);
+        } else {
+            let [xy, xz, yz] = [D[0][1] + D[1][0], D[0][2] + D[2][0], D[1][2] + D[2][1]];
+            let shear = half * xy.mul_add(xy, xz.mul_add(xz, yz * yz));
+            square = D[0][0].mul_add(D[0][0], D[1][1].mul_add(D[1][1], D[2][2].mul_add(D[2][2], shear)));
+            trace = D[0][0] + D[1][1] + D[2][2];
+        }
+        let energy = V::load(&rest.volume) * mu.mul_add(square, half_lambda * trace * trace);
+        let energy = energy.store();
+        for lane in 0..LANES {
+            sums[lane] += f64::from(energy.0[lane]);
+        }
+    }
+    let mut total = 0.0;
+    for sum in sums {
+        total += sum;
+    }
+    total
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    //! The same loops compiled for AVX2 and FMA.
+
+    use super::{Batch, Batches, Coefficients, EnergyCoefficients, Locals, Padded, RestBatch};
+    use scindo_matter::element::avx2::Register;
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn apply(of: &Batches, x: &[Padded], y: &mut [Padded]) {
+        super::apply_all::<Register, 1>(of, x, y);
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+        super::update_all::<Register, 1>(of, c, locals)
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn energy(c: EnergyCoefficients, rest: &[RestBatch], live: &[Batch], u: &[[f64; 4]]) -> f64 {
+        super::energy_with::<Register>(c, rest, live, u)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx512 {
+    //! The same loops for two batches at once; one that is left over takes AVX2.
+
+    use super::{Batches, Coefficients, Locals, Padded};
+    use scindo_matter::element::avx512::Register512;
+
+    #[target_feature(enable = "avx512f,avx2,fma")]
+    pub fn apply(of: &Batches, x: &[Padded], y: &mut [Padded]) {
+        super::apply_all::<Register512, 2>(of, x, y);
+    }
+
+    #[target_feature(enable = "avx512f,avx2,fma")]
+    pub fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+        super::update_all::<Register512, 2>(of, c, locals)
+    }
+}
