@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// A commit and the files that change when another one is checked out.
-pub struct Commit {
+pub(crate) struct Commit {
     /// Ten hexadecimal digits, with `-modified` if files differ from it.
     pub name: String,
     /// Files of the repository to be watched.
@@ -12,7 +12,7 @@ pub struct Commit {
 }
 
 /// The commit that is checked out in `folder`; `None` outside of a repository, or without git.
-pub fn of(folder: &Path) -> Option<Commit> {
+pub(crate) fn of(folder: &Path) -> Option<Commit> {
     let name = git(folder, &["describe", "--always", "--exclude=*", "--abbrev=10", "--dirty=-modified"])?;
     let of_head = git(folder, &["symbolic-ref", "-q", "HEAD"]);
     let names = ["HEAD", "index", "packed-refs"].into_iter().map(str::to_owned).chain(of_head);

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 /// Folders whose types and arithmetic a state depends on, relative to this crate.
-const SOURCES: [&str; 5] =
-    ["src", "../matter/src", "../algebra/src", "../physics/src", "../collision/src"];
+const SOURCES: [&str; 5] = ["src", "../matter/src", "../algebra/src", "../physics/src", "../collision/src"];
 
 fn main() -> io::Result<()> {
     let mut hash = DefaultHasher::new();

@@ -11,11 +11,11 @@ use tracing_subscriber::layer::{Context, Filter};
 const EVERY: Duration = Duration::from_secs(1);
 
 /// Target of lines that are already limited where they are written. They are let through.
-pub const COUNTED: &str = "scindo::exchange";
+pub(crate) const COUNTED: &str = "scindo::exchange";
 
 /// A filter that lets one line through per place in the code and per second.
 #[derive(Debug, Default)]
-pub struct Seldom {
+pub(crate) struct Seldom {
     /// Time of the last line of each place, by module and line number.
     written: Mutex<BTreeMap<(&'static str, u32), Instant>>,
 }

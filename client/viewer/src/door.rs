@@ -30,7 +30,7 @@ const LONGEST_VISIT: Duration = Duration::from_secs(60);
 const BROWSER_SILENCE: Duration = Duration::from_secs(30);
 
 /// How often a browser is pinged.
-pub const PING: Duration = Duration::from_secs(10);
+pub(crate) const PING: Duration = Duration::from_secs(10);
 
 /// Most connections of one address that are not browsers yet. A page opens six at a time.
 const PER_ADDRESS: usize = 64;
@@ -57,7 +57,7 @@ struct Visits {
 
 /// The peer of a connection.
 #[derive(Debug)]
-pub struct Visitor {
+pub(crate) struct Visitor {
     /// Address of the peer.
     pub address: SocketAddr,
     number: u64,
@@ -69,7 +69,7 @@ pub struct Visitor {
 
 /// The peer of a request, as handlers receive it.
 #[derive(Debug, Clone)]
-pub struct From(pub Arc<Visitor>);
+pub(crate) struct From(pub Arc<Visitor>);
 
 /// A connection that ends when its peer is silent for too long.
 #[derive(Debug)]
@@ -164,7 +164,7 @@ impl Visits {
 
 impl Visitor {
     /// Marks the peer as a seated browser, which no longer counts as a visit.
-    pub fn becomes_browser(&self) {
+    pub(crate) fn becomes_browser(&self) {
         self.is_browser.store(true, Ordering::Relaxed);
         lock(&self.visits).open.remove(&self.number);
     }

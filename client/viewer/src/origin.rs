@@ -7,7 +7,7 @@ use axum::http::{HeaderMap, header};
 ///
 /// A server that listens on loopback also requires a loopback name in Host. Otherwise a foreign name that
 /// resolves to 127.0.0.1 would pass as same origin.
-pub fn is_allowed(headers: &HeaderMap, allowed: &[String], loopback_only: bool) -> bool {
+pub(crate) fn is_allowed(headers: &HeaderMap, allowed: &[String], loopback_only: bool) -> bool {
     let host = text(headers, header::HOST);
     if loopback_only && !host.is_some_and(is_loopback_name) {
         return false;

@@ -16,12 +16,12 @@ const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; conn
                       img-src 'self' data: blob:; frame-ancestors 'self'";
 
 /// Whether npm built the page. Otherwise the served page explains what to install.
-pub fn is_built() -> bool {
+pub(crate) fn is_built() -> bool {
     Page::get("viewer.js").is_some()
 }
 
 /// Serves a file of the page: the embedded one, or one from `folder` during work on the page.
-pub fn serve(name: &str, folder: Option<&Path>) -> Response {
+pub(crate) fn serve(name: &str, folder: Option<&Path>) -> Response {
     let name = if name.is_empty() { "index.html" } else { name };
     let Some(bytes) = read(name, folder) else {
         return (StatusCode::NOT_FOUND, "no such file").into_response();

@@ -33,7 +33,7 @@ const TEXTURE_ATTEMPTS: usize = 5;
 const INFO_PATIENCE: Duration = Duration::from_secs(10);
 
 /// Keeps a link to the server for as long as the viewer lives.
-pub async fn run(hub: Arc<Hub>, mut up: mpsc::Receiver<Up>, config: LinkConfig) {
+pub(crate) async fn run(hub: Arc<Hub>, mut up: mpsc::Receiver<Up>, config: LinkConfig) {
     let place = config.connect.join(", ");
     loop {
         let waiting = format!("no server yet at {place}");

@@ -14,7 +14,7 @@ pub(crate) struct Stars {
 
 impl Stars {
     /// The stars of a surface.
-    pub fn new(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+    pub(crate) fn new(vertices: usize, triangles: &[[u32; 3]]) -> Self {
         let mut stars = Self { first: vec![NONE; vertices], next: vec![NONE; 3 * triangles.len()] };
         // From the last to the first, every corner comes before all others of its list.
         for (t, corners) in triangles.iter().enumerate().rev() {
@@ -28,13 +28,13 @@ impl Stars {
 
     /// Makes room for other numbers of vertices and triangles. Vertices and triangles that fall away must not
     /// be linked any more.
-    pub fn resize(&mut self, vertices: usize, triangles: usize) {
+    pub(crate) fn resize(&mut self, vertices: usize, triangles: usize) {
         self.first.resize(vertices, NONE);
         self.next.resize(3 * triangles, NONE);
     }
 
     /// Adds a triangle to the stars of its corners.
-    pub fn insert(&mut self, triangle: u32, corners: [u32; 3]) {
+    pub(crate) fn insert(&mut self, triangle: u32, corners: [u32; 3]) {
         for (corner, v) in (3 * triangle..).zip(corners) {
             let (mut before, mut at) = (NONE, self.first[v as usize]);
             while at < corner {
@@ -46,7 +46,7 @@ impl Stars {
     }
 
     /// Takes a triangle out of the stars of its corners.
-    pub fn remove(&mut self, triangle: u32, corners: [u32; 3]) {
+    pub(crate) fn remove(&mut self, triangle: u32, corners: [u32; 3]) {
         for (corner, v) in (3 * triangle..).zip(corners) {
             let (mut before, mut at) = (NONE, self.first[v as usize]);
             while at < corner {
@@ -64,7 +64,7 @@ impl Stars {
     }
 
     /// Triangles around `vertex`, ascending.
-    pub fn around(&self, vertex: u32) -> impl Iterator<Item = u32> {
+    pub(crate) fn around(&self, vertex: u32) -> impl Iterator<Item = u32> {
         let step = |corner: u32| (corner != NONE).then_some(corner);
         std::iter::successors(step(self.first[vertex as usize]), move |&c| step(self.next[c as usize]))
             .map(|corner| corner / 3)

@@ -9,12 +9,12 @@ use nalgebra::Vector3;
 use crate::cut::Surface;
 
 /// The vector (x, y, z).
-pub fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
+pub(crate) fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
     Vector3::new(x, y, z)
 }
 
 /// Random vectors.
-pub trait Vectors {
+pub(crate) trait Vectors {
     /// Uniform in the cube of half width `r` around the origin.
     fn vector(&mut self, r: f64) -> Vector3<f64>;
 
@@ -38,7 +38,7 @@ impl Vectors for Rng {
 }
 
 /// A sweep over the square of half width `reach` [m] in the plane through `point` with the normal.
-pub fn square(point: Vector3<f64>, normal: Vector3<f64>, reach: f64) -> [[Vector3<f64>; 2]; 2] {
+pub(crate) fn square(point: Vector3<f64>, normal: Vector3<f64>, reach: f64) -> [[Vector3<f64>; 2]; 2] {
     let n = normal.normalize();
     let helper = if n.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
     let u = n.cross(&helper).normalize() * reach;
@@ -47,7 +47,7 @@ pub fn square(point: Vector3<f64>, normal: Vector3<f64>, reach: f64) -> [[Vector
 }
 
 /// Each directed edge once, its opposite once, every vertex link a single cycle, every vertex used.
-pub fn surface_is_closed_and_manifold(surface: &Surface) {
+pub(crate) fn surface_is_closed_and_manifold(surface: &Surface) {
     assert_eq!(surface.triangles.len(), surface.tags.len());
     let mut edges = BTreeSet::new();
     let mut link: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();

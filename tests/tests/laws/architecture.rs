@@ -102,7 +102,8 @@ fn physics_and_collision_stay_pure() {
     ];
     let mut wrong = Vec::new();
     for room in ["matter", "algebra", "physics", "collision"] {
-        let mut open = vec![std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../server").join(room).join("src")];
+        let mut open =
+            vec![std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../server").join(room).join("src")];
         while let Some(path) = open.pop() {
             if path.is_dir() {
                 open.extend(std::fs::read_dir(&path).expect("readable").map(|e| e.expect("entry").path()));

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Segments of a path, from the crate on.
-pub type Segments = Vec<String>;
+pub(crate) type Segments = Vec<String>;
 
 /// What the source of a module takes from others.
 #[derive(Default)]
-pub struct Taken {
+pub(crate) struct Taken {
     /// Paths as they are written.
     pub paths: Vec<Segments>,
     /// Those that it hands on.
@@ -54,7 +54,7 @@ fn paths(tree: &str, before: &Segments, out: &mut Vec<Segments>) {
 }
 
 /// What the source of a module takes from others.
-pub fn taken(source: &str) -> Taken {
+pub(crate) fn taken(source: &str) -> Taken {
     let text = plain(source);
     let mut taken = Taken::default();
     let mut lines = text.lines();
@@ -85,7 +85,7 @@ pub fn taken(source: &str) -> Taken {
 }
 
 /// The modules of a crate by their path, without `lib.rs`, `main.rs` and tests.
-pub fn modules(folder: &Path, at: &Segments, out: &mut BTreeMap<Segments, Taken>) {
+pub(crate) fn modules(folder: &Path, at: &Segments, out: &mut BTreeMap<Segments, Taken>) {
     for entry in std::fs::read_dir(folder).expect("readable").map(|e| e.expect("entry").path()) {
         let name = entry.file_stem().and_then(|s| s.to_str()).expect("a name").to_owned();
         if name.ends_with("tests") || ["lib", "main"].contains(&name.as_str()) {
@@ -104,7 +104,7 @@ pub fn modules(folder: &Path, at: &Segments, out: &mut BTreeMap<Segments, Taken>
 }
 
 /// A path from the crate on, as module `at` writes it.
-pub fn absolute(at: &Segments, path: &[String], all: &BTreeMap<Segments, Taken>) -> Option<Segments> {
+pub(crate) fn absolute(at: &Segments, path: &[String], all: &BTreeMap<Segments, Taken>) -> Option<Segments> {
     let rest = |from: &[String], skip: usize| from.iter().chain(&path[skip..]).cloned().collect();
     match path.first()?.as_str() {
         "crate" => Some(rest(&[], 1)),
@@ -121,7 +121,7 @@ pub fn absolute(at: &Segments, path: &[String], all: &BTreeMap<Segments, Taken>)
 }
 
 /// The folders of all crates of the product with a library, by their names.
-pub fn crates() -> BTreeMap<String, PathBuf> {
+pub(crate) fn crates() -> BTreeMap<String, PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let inside = |side: &str| {
         let folders = std::fs::read_dir(root.join(side)).expect("readable");

@@ -195,7 +195,7 @@ impl Arguments {
 }
 
 /// Refuses what cannot work, before anything is opened.
-pub fn check(arguments: &Arguments, device: &Capability) -> Result<Limits, CommandError> {
+pub(super) fn check(arguments: &Arguments, device: &Capability) -> Result<Limits, CommandError> {
     let fail =
         |what, found: f64, next: String| Err(CommandError::Argument { what, found: found.to_string(), next });
     let Arguments { max_force, slew, pose_hz, depth, clearance, .. } = arguments;

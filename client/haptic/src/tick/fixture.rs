@@ -9,11 +9,11 @@ use scindo_proto::messages::{Contact, HapticContact, Pose, Vec3, Vec3f, haptic_c
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-pub const MS: u64 = 1_000_000;
-pub const LIMITS: Limits = Limits { max_force_n: 2.5, slew_n_s: 50.0 };
+pub(crate) const MS: u64 = 1_000_000;
+pub(crate) const LIMITS: Limits = Limits { max_force_n: 2.5, slew_n_s: 50.0 };
 
 /// A message of a tool in free space.
-pub fn free(seq: u64) -> HapticContact {
+pub(crate) fn free(seq: u64) -> HapticContact {
     HapticContact {
         seq,
         sim_step: seq,
@@ -29,7 +29,7 @@ pub fn free(seq: u64) -> HapticContact {
 }
 
 /// A message with one plane through the origin, normal +z, and `force_n` at the origin.
-pub fn contact(seq: u64, force_n: f64, stiffness_n_m: f32) -> HapticContact {
+pub(crate) fn contact(seq: u64, force_n: f64, stiffness_n_m: f32) -> HapticContact {
     let z = |z| Some(Vec3f { x: 0.0, y: 0.0, z });
     let plane = Contact {
         point_m: z(0.0),
@@ -43,10 +43,10 @@ pub fn contact(seq: u64, force_n: f64, stiffness_n_m: f32) -> HapticContact {
 
 /// A device that reports what the test sets and keeps the force that it received.
 #[derive(Clone)]
-pub struct FakeDevice(Arc<Mutex<(DeviceState, Vector3<f64>)>>, Arc<AtomicBool>);
+pub(crate) struct FakeDevice(Arc<Mutex<(DeviceState, Vector3<f64>)>>, Arc<AtomicBool>);
 
 impl FakeDevice {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let state = DeviceState {
             position_m: Vector3::zeros(),
             velocity_m_s: Vector3::zeros(),
@@ -56,16 +56,16 @@ impl FakeDevice {
         Self(Arc::new(Mutex::new((state, Vector3::zeros()))), Arc::default())
     }
 
-    pub fn place(&self, position_m: Vector3<f64>, velocity_m_s: Vector3<f64>) {
+    pub(crate) fn place(&self, position_m: Vector3<f64>, velocity_m_s: Vector3<f64>) {
         let mut inner = self.0.lock().unwrap();
         (inner.0.position_m, inner.0.velocity_m_s) = (position_m, velocity_m_s);
     }
 
-    pub fn unplug(&self, gone: bool) {
+    pub(crate) fn unplug(&self, gone: bool) {
         self.1.store(gone, Ordering::Relaxed);
     }
 
-    pub fn given(&self) -> Vector3<f64> {
+    pub(crate) fn given(&self) -> Vector3<f64> {
         self.0.lock().unwrap().1
     }
 }
@@ -85,7 +85,7 @@ impl HapticDevice for FakeDevice {
 }
 
 /// A loop on a fake device, fed message by message.
-pub struct Rig {
+pub(crate) struct Rig {
     pub device: FakeDevice,
     pub inbox: ContactInbox,
     pub alive: Arc<AtomicBool>,
@@ -95,7 +95,7 @@ pub struct Rig {
 }
 
 impl Rig {
-    pub fn new(limits: Limits) -> Self {
+    pub(crate) fn new(limits: Limits) -> Self {
         let (device, alive) = (FakeDevice::new(), Arc::new(AtomicBool::new(true)));
         let (input, contacts) = contact_slot();
         let ports = Ports { contacts, server_alive: alive.clone(), poses: None, log: None, meter: None };
@@ -103,13 +103,17 @@ impl Rig {
         Self { device, inbox: ContactInbox::new(input, ""), alive, tick, now_ns: MS, seq: 0 }
     }
 
-    pub fn step(&mut self) -> TickOutput {
+    pub(crate) fn step(&mut self) -> TickOutput {
         self.now_ns += MS;
         self.tick.tick(TickTime { now_ns: self.now_ns, elapsed_s: 1e-3 })
     }
 
     /// Runs `ms` ticks with a new message every fifth tick; without messages if `None`.
-    pub fn run(&mut self, ms: usize, message: Option<&dyn Fn(u64) -> HapticContact>) -> Vec<TickOutput> {
+    pub(crate) fn run(
+        &mut self,
+        ms: usize,
+        message: Option<&dyn Fn(u64) -> HapticContact>,
+    ) -> Vec<TickOutput> {
         let one = |i: usize| {
             if let (Some(message), 0) = (message, i % 5) {
                 self.seq += 1;
@@ -121,7 +125,7 @@ impl Rig {
     }
 
     /// Presses down to `depth_m` [m] at 20 mm/s, as a hand would, and waits. The hand pays for the force.
-    pub fn press(&mut self, depth_m: f64, message: &dyn Fn(u64) -> HapticContact) -> Vec<TickOutput> {
+    pub(crate) fn press(&mut self, depth_m: f64, message: &dyn Fn(u64) -> HapticContact) -> Vec<TickOutput> {
         let mut outputs = Vec::new();
         let ticks = (depth_m / 2e-5).ceil().max(1.0);
         for i in 1..=ticks as usize {
@@ -138,7 +142,7 @@ impl Rig {
     }
 
     /// A rig that is engaged at full gain, without force.
-    pub fn engaged(limits: Limits) -> Self {
+    pub(crate) fn engaged(limits: Limits) -> Self {
         let mut rig = Self::new(limits);
         rig.run(600, Some(&free));
         rig

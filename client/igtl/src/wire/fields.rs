@@ -11,12 +11,12 @@ pub(super) struct Fields<'a> {
 
 impl<'a> Fields<'a> {
     /// Fields of the content of a message of type `kind`.
-    pub fn new(kind: &'static str, content: &'a [u8]) -> Self {
+    pub(super) fn new(kind: &'static str, content: &'a [u8]) -> Self {
         Self { kind, left: content }
     }
 
     /// The next `N` bytes.
-    pub fn array<const N: usize>(&mut self) -> Result<[u8; N], Unreadable> {
+    pub(super) fn array<const N: usize>(&mut self) -> Result<[u8; N], Unreadable> {
         match self.left.split_first_chunk::<N>() {
             Some((first, rest)) => {
                 self.left = rest;
@@ -27,7 +27,7 @@ impl<'a> Fields<'a> {
     }
 
     /// The next `count` bytes.
-    pub fn bytes(&mut self, count: usize) -> Result<&'a [u8], Unreadable> {
+    pub(super) fn bytes(&mut self, count: usize) -> Result<&'a [u8], Unreadable> {
         match self.left.split_at_checked(count) {
             Some((first, rest)) => {
                 self.left = rest;
@@ -37,29 +37,29 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub fn u16(&mut self) -> Result<u16, Unreadable> {
+    pub(super) fn u16(&mut self) -> Result<u16, Unreadable> {
         self.array().map(u16::from_be_bytes)
     }
 
-    pub fn u32(&mut self) -> Result<u32, Unreadable> {
+    pub(super) fn u32(&mut self) -> Result<u32, Unreadable> {
         self.array().map(u32::from_be_bytes)
     }
 
-    pub fn i64(&mut self) -> Result<i64, Unreadable> {
+    pub(super) fn i64(&mut self) -> Result<i64, Unreadable> {
         self.array().map(i64::from_be_bytes)
     }
 
-    pub fn f32(&mut self) -> Result<f32, Unreadable> {
+    pub(super) fn f32(&mut self) -> Result<f32, Unreadable> {
         self.array().map(f32::from_be_bytes)
     }
 
     /// A text of `count` bytes that ends at the first zero.
-    pub fn text(&mut self, count: usize) -> Result<String, Unreadable> {
+    pub(super) fn text(&mut self, count: usize) -> Result<String, Unreadable> {
         self.bytes(count).map(text)
     }
 
     /// Bytes that are left.
-    pub fn left(&self) -> usize {
+    pub(super) fn left(&self) -> usize {
         self.left.len()
     }
 

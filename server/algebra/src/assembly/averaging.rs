@@ -41,11 +41,11 @@ pub(super) struct NodeAverage {
 
 impl NodeAverage {
     /// κ for the setting `kept`: that share of λ, or of 25 μ if λ is larger.
-    pub fn share(kept: f64, Lame { mu, lambda }: Lame) -> f64 {
+    pub(super) fn share(kept: f64, Lame { mu, lambda }: Lame) -> f64 {
         if lambda > STIFFEST * mu { kept * STIFFEST * mu / lambda } else { kept }
     }
 
-    pub fn new(connectivity: &[u32], volumes: &[f64], n_nodes: usize, kept: f64) -> Self {
+    pub(super) fn new(connectivity: &[u32], volumes: &[f64], n_nodes: usize, kept: f64) -> Self {
         let mut lists: Vec<Vec<u32>> = vec![Vec::new(); n_nodes];
         for (e, nodes) in (0u32..).zip(connectivity.chunks_exact(4)) {
             nodes.iter().for_each(|&n| lists[n as usize].push(e));
@@ -94,17 +94,17 @@ impl NodeAverage {
     }
 
     /// Nodes of the elements around node `n`, sorted; `n` itself among them.
-    pub fn star(&self, n: usize) -> &[u32] {
+    pub(super) fn star(&self, n: usize) -> &[u32] {
         &self.star[self.star_range(n)]
     }
 
     /// Total length of all stars: the length of the gradients `c`.
-    pub fn star_entries(&self) -> usize {
+    pub(super) fn star_entries(&self) -> usize {
         self.star.len()
     }
 
     /// θ̄_n from the θ_e of the elements; zero for a node without volume.
-    pub fn average(&self, n: usize, theta: &[f64], volumes: &[f64]) -> f64 {
+    pub(super) fn average(&self, n: usize, theta: &[f64], volumes: &[f64]) -> f64 {
         if self.volume[n] == 0.0 {
             return 0.0;
         }
@@ -114,19 +114,19 @@ impl NodeAverage {
     }
 
     /// (1 − κ) λ/2 Σ V_n θ̄_n² \[J\].
-    pub fn energy(&self, lambda: f64, theta_bar: &[f64]) -> f64 {
+    pub(super) fn energy(&self, lambda: f64, theta_bar: &[f64]) -> f64 {
         let sum: f64 = self.volume.iter().zip(theta_bar).map(|(v, t)| v * t * t).sum();
         0.5 * (1.0 - self.kept) * lambda * sum
     }
 
     /// (1 − κ) λ · mean of θ̄ over the nodes of an element [Pa].
-    pub fn pressure(&self, lambda: f64, nodes: &[u32], theta_bar: &[f64]) -> f64 {
+    pub(super) fn pressure(&self, lambda: f64, nodes: &[u32], theta_bar: &[f64]) -> f64 {
         let sum: f64 = nodes.iter().map(|&n| theta_bar[n as usize]).sum();
         (1.0 - self.kept) * lambda * sum / 4.0
     }
 
     /// c_i = ∂(V_n θ̄_n)/∂x_i [m²] for every i in the star of `n`, from ∂θ_e/∂F of the elements.
-    pub fn gradient(
+    pub(super) fn gradient(
         &self,
         n: usize,
         theta_gradient: &[Matrix3<f64>],
@@ -146,7 +146,7 @@ impl NodeAverage {
     }
 
     /// Adds (1 − κ) λ Σ_n c_i c_jᵀ / V_n to row `i` of the tangent, whose blocks are `row`.
-    pub fn add_to_row(
+    pub(super) fn add_to_row(
         &self,
         i: usize,
         lambda: f64,

@@ -30,7 +30,7 @@ pub(super) enum Products {
 
 impl Products {
     /// Per unit volume of a linear tetrahedron: (1 + δ_ab)/20.
-    pub fn linear_tet() -> Self {
+    pub(super) fn linear_tet() -> Self {
         let M: [[f64; 4]; 4] =
             std::array::from_fn(|a| std::array::from_fn(|b| if a == b { 0.1 } else { 0.05 }));
         Products::Scaled(pack(&M).collect())

@@ -11,7 +11,7 @@ pub(super) struct PointLaw {
 }
 
 impl PointLaw {
-    pub fn energy(&self, F: &Matrix3<f64>) -> f64 {
+    pub(super) fn energy(&self, F: &Matrix3<f64>) -> f64 {
         match self.green(F, &Matrix3::zeros()) {
             Some([E, S]) => 0.5 * S.dot(&E),
             None => self.law.energy(F, self.lame),
@@ -19,21 +19,21 @@ impl PointLaw {
     }
 
     /// ψ [J/m³] and P [Pa].
-    pub fn energy_and_stress(&self, F: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
+    pub(super) fn energy_and_stress(&self, F: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
         match self.green(F, &Matrix3::zeros()) {
             Some([E, S]) => (0.5 * S.dot(&E), F * S),
             None => self.law.energy_and_stress(F, self.lame),
         }
     }
 
-    pub fn tangent(&self, F: &Matrix3<f64>, kind: Tangent) -> Matrix9 {
+    pub(super) fn tangent(&self, F: &Matrix3<f64>, kind: Tangent) -> Matrix9 {
         self.law.tangent(F, self.lame, kind)
     }
 
     /// Green strain E = ½ (FᵀF − DᵀD − I) and second Piola–Kirchhoff stress S = 2μ E + λ tr(E) I [Pa] of
     /// St. Venant–Kirchhoff's law: at F for D = 0, else those of F − D extrapolated linearly to F. `None` for
     /// other laws, and where a stretch is so small that the law departs from its textbook form.
-    pub fn green(&self, F: &Matrix3<f64>, D: &Matrix3<f64>) -> Option<[Matrix3<f64>; 2]> {
+    pub(super) fn green(&self, F: &Matrix3<f64>, D: &Matrix3<f64>) -> Option<[Matrix3<f64>; 2]> {
         if self.law != Law::StVenantKirchhoff || F.determinant() <= 0.0 {
             return None;
         }
@@ -50,7 +50,7 @@ impl PointLaw {
     }
 
     /// The law split into shear and volume, if it has a volumetric part λ/2 θ².
-    pub fn split(&self) -> Option<Split> {
+    pub(super) fn split(&self) -> Option<Split> {
         self.law.split(self.lame)
     }
 }

@@ -15,13 +15,13 @@ pub(super) struct Viscous {
 impl Viscous {
     /// Whether there are no terms, so that nothing is computed for them.
     #[inline]
-    pub fn is_off(&self) -> bool {
+    pub(super) fn is_off(&self) -> bool {
         self.start.is_empty()
     }
 
     /// The spring at point number `point`, counted through all elements, where the shear modulus is `mu` [Pa].
     #[inline]
-    pub fn spring(&self, point: usize, mu: f64) -> PronySpring {
+    pub(super) fn spring(&self, point: usize, mu: f64) -> PronySpring {
         PronySpring { modulus: mu * self.stiffness, start: self.start[point] }
     }
 }

@@ -16,7 +16,7 @@ use super::tet_batch::{Block6, Coefficients, EnergyCoefficients, Locals, RestBat
 use super::{Padded, padded};
 
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Chunk {
+pub(super) struct Chunk {
     /// Group of its elements.
     pub group: usize,
     /// Numbers of lanes and copies when the chunk was planned; `n_lanes` is the present number.
@@ -49,7 +49,7 @@ pub struct Chunk {
 
 /// A carrier (a piece that gets a lane), and the rotation to start with.
 #[derive(Clone, Copy, Debug)]
-pub struct NewLane {
+pub(super) struct NewLane {
     /// Index of the carrier.
     pub piece: u32,
     /// Rotation R that its lane starts with.
@@ -58,7 +58,7 @@ pub struct NewLane {
 
 impl Chunk {
     /// Arranges the carriers `members` (ascending) in batches.
-    pub fn new(group: usize, members: &[NewLane], mesh: &TetMesh, merged: &[Merged]) -> Self {
+    pub(super) fn new(group: usize, members: &[NewLane], mesh: &TetMesh, merged: &[Merged]) -> Self {
         let pieces: Vec<u32> = members.iter().map(|lane| lane.piece).collect();
         let plan = plan_chunk(&pieces, |p| merged[p as usize].piece.copies);
         // Spare capacity for what cuts add before the next plan.
@@ -97,19 +97,19 @@ impl Chunk {
     }
 
     /// Carrier, batch and lane of all lanes in use.
-    pub fn lanes(&self) -> impl Iterator<Item = (u32, usize, usize)> + '_ {
+    pub(super) fn lanes(&self) -> impl Iterator<Item = (u32, usize, usize)> + '_ {
         let lanes = self.pieces.iter().enumerate();
         let lanes = lanes.flat_map(|(b, lanes)| lanes.iter().enumerate().map(move |(l, &p)| (p, b, l)));
         lanes.filter(|&(p, ..)| p != NO_PIECE)
     }
 
     /// All lanes in use with their rotations, to be arranged anew.
-    pub fn new_lanes(&self) -> impl Iterator<Item = NewLane> + '_ {
+    pub(super) fn new_lanes(&self) -> impl Iterator<Item = NewLane> + '_ {
         self.lanes().map(|(piece, b, l)| NewLane { piece, rotation: self.rotation(b, l) })
     }
 
     /// Rotation of a lane at the last update.
-    pub fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
+    pub(super) fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
         let rotation = &self.batches.rest()[batch].rotation;
         Matrix3::from_fn(|i, j| rotation[3 * i + j].0[lane])
     }
@@ -117,7 +117,7 @@ impl Chunk {
     /// Amends copies and fractions of the carriers marked in `is_amended`, and gives the `added` ones
     /// lanes. Copies new to the chunk are new to the body, so `copies` stays in order. Returns `false`
     /// and does nothing if the chunk has grown so much that packing and numbering it anew pays.
-    pub fn follow(
+    pub(super) fn follow(
         &mut self,
         mesh: &TetMesh,
         merged: &[Merged],
@@ -183,17 +183,17 @@ impl Chunk {
     }
 
     /// Bytes of stiffness that one application streams.
-    pub fn bytes(&self) -> usize {
+    pub(super) fn bytes(&self) -> usize {
         self.edges.as_ref().map_or_else(|| self.batches.bytes(), EdgeBlocks::bytes)
     }
 
     /// Number of lanes in use.
-    pub fn n_lanes(&self) -> usize {
+    pub(super) fn n_lanes(&self) -> usize {
         self.n_lanes
     }
 
     /// Assembles the stiffness of the last update, or drops the assembled one if it is not `wanted`.
-    pub fn assemble(&mut self, wanted: bool) {
+    pub(super) fn assemble(&mut self, wanted: bool) {
         let Self { edges, batches, unassembled, .. } = self;
         match edges {
             _ if !wanted => *edges = None,
@@ -215,7 +215,7 @@ impl Chunk {
 
     /// Asks for the stiffness that [`Self::apply`] reads first, before x is gathered.
     #[inline(always)]
-    pub fn ask_for_stiffness(&self) {
+    pub(super) fn ask_for_stiffness(&self) {
         if self.edges.is_none() {
             self.batches.ask_for_first();
         }
@@ -223,7 +223,7 @@ impl Chunk {
 
     /// y = s K̂ x; `y` may have more rows than the chunk uses.
     #[inline(always)]
-    pub fn apply(&self, simd: Simd, y: &mut [Padded]) {
+    pub(super) fn apply(&self, simd: Simd, y: &mut [Padded]) {
         let y = self.used(y);
         y.fill([0.0; 4]);
         match &self.edges {
@@ -234,7 +234,13 @@ impl Chunk {
 
     /// y = K̂ u with displacements u relative to the chunk's first copy, subtracted in double
     /// precision: the error is relative to the chunk, not to how far the body has moved.
-    pub fn linear_forces(&mut self, simd: Simd, scale: f32, positions: &[Vector3<f64>], y: &mut [Padded]) {
+    pub(super) fn linear_forces(
+        &mut self,
+        simd: Simd,
+        scale: f32,
+        positions: &[Vector3<f64>],
+        y: &mut [Padded],
+    ) {
         let displacement = |copy: u32, rest: &Vector3<f64>| positions[copy as usize] - rest;
         let held = self.copies.iter().zip(&self.rest);
         let origin =
@@ -251,7 +257,7 @@ impl Chunk {
     }
 
     /// Updates rotations, gradients, internal forces `f` and diagonal blocks.
-    pub fn update(
+    pub(super) fn update(
         &mut self,
         simd: Simd,
         c: &Coefficients,
@@ -272,7 +278,7 @@ impl Chunk {
     }
 
     /// Computes the energy with the rotations of the last update.
-    pub fn find_energy(&mut self, simd: Simd, c: EnergyCoefficients, positions: &[Vector3<f64>]) {
+    pub(super) fn find_energy(&mut self, simd: Simd, c: EnergyCoefficients, positions: &[Vector3<f64>]) {
         let held = self.copies.iter().zip(&self.rest);
         for (local, (&copy, rest)) in self.positions.iter_mut().zip(held) {
             let u = positions[copy as usize] - rest;

@@ -15,11 +15,11 @@ use super::strips::{Corners, NODES as STRIP_NODES, TETS as STRIP_TETS, find_stri
 const OPEN_BATCHES: usize = 32;
 
 /// Marks a lane without a piece.
-pub const NO_PIECE: u32 = u32::MAX;
+pub(super) const NO_PIECE: u32 = u32::MAX;
 
 /// The pieces of one chunk in batches, with local numbers for their copies.
 #[derive(Clone, Debug)]
-pub struct ChunkPlan {
+pub(super) struct ChunkPlan {
     /// Copy of every local number, ascending. One more number, `copies.len()`, is the waste bin: unused
     /// lanes read and write there.
     pub copies: Vec<u32>,
@@ -33,7 +33,7 @@ pub struct ChunkPlan {
 }
 
 /// Packs the pieces `chunk`, ascending ids, into batches and numbers their copies.
-pub fn plan_chunk(chunk: &[u32], copies_of: impl Fn(u32) -> [u32; 4]) -> ChunkPlan {
+pub(super) fn plan_chunk(chunk: &[u32], copies_of: impl Fn(u32) -> [u32; 4]) -> ChunkPlan {
     let held: Vec<[u32; 4]> = chunk.iter().map(|&p| copies_of(p)).collect();
     let mut copies = held.as_flattened().to_vec();
     copies.sort_unstable();
@@ -98,7 +98,7 @@ fn set_lane(ids: &mut [Ids; 4], lane: usize, numbers: &[u16]) {
 /// First-fit packing of `items`, local numbers below `n_locals`, into batches without a common number,
 /// over a short list of open batches. Lanes hold item numbers. The items left at the end are packed
 /// regardless of their numbers, which is correct because lanes are summed one after the other.
-pub fn pack<const N: usize>(items: &[[u16; N]], n_locals: usize) -> Vec<[u32; LANES]> {
+pub(super) fn pack<const N: usize>(items: &[[u16; N]], n_locals: usize) -> Vec<[u32; LANES]> {
     let mut packing = Packing {
         full: Vec::with_capacity(items.len() / LANES + OPEN_BATCHES),
         batches: [[NO_PIECE; LANES]; OPEN_BATCHES],
@@ -171,7 +171,7 @@ impl Packing {
 /// Rows of the chunks' sums of every copy, in chunk order, within one vector for all chunks. Row 0 of
 /// that vector is always 0.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Gather {
+pub(super) struct Gather {
     /// First row of every chunk's own sums, and the end. A chunk has rows for its copies, for the waste
     /// bin and for copies that cuts add.
     pub first_row: Vec<u32>,
@@ -185,7 +185,7 @@ pub struct Gather {
 
 impl Gather {
     /// Bytes in use.
-    pub fn memory(&self) -> usize {
+    pub(super) fn memory(&self) -> usize {
         size_of_val(&self.first_row[..])
             + size_of_val(&self.pairs[..])
             + size_of_val(&self.further[..])
@@ -193,12 +193,12 @@ impl Gather {
     }
 
     /// Lists the rows of every copy. Every chunk gets rows for as many copies again.
-    pub fn new<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
+    pub(super) fn new<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
         Self::with_rows(chunks, n_copies, |n| 2 * n + 1)
     }
 
     /// Lists the rows of every copy; chunks have rows for the copies they have now and no more.
-    pub fn without_room<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
+    pub(super) fn without_room<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
         Self::with_rows(chunks, n_copies, |n| n)
     }
 
@@ -218,14 +218,18 @@ impl Gather {
     }
 
     /// Lists the rows of every copy anew; chunks keep their rows.
-    pub fn arrange<'a>(&mut self, chunks: impl Iterator<Item = &'a [u32]>, n_copies: usize) {
+    pub(super) fn arrange<'a>(&mut self, chunks: impl Iterator<Item = &'a [u32]>, n_copies: usize) {
         self.pairs.clear();
         self.further.clear();
         self.append(chunks.zip(0..).map(|(copies, chunk)| (chunk, copies, 0)), n_copies);
     }
 
     /// Adds copies to chunks, each given by its number, its copies and the index of the first new one.
-    pub fn append<'a>(&mut self, chunks: impl Iterator<Item = (usize, &'a [u32], usize)>, n_copies: usize) {
+    pub(super) fn append<'a>(
+        &mut self,
+        chunks: impl Iterator<Item = (usize, &'a [u32], usize)>,
+        n_copies: usize,
+    ) {
         resize_reserving(&mut self.pairs, n_copies, [0; 2]);
         for (chunk, copies, known) in chunks {
             let first = self.first_row[chunk];
@@ -255,18 +259,18 @@ impl Gather {
     }
 
     /// Number of rows of a chunk.
-    pub fn room(&self, chunk: usize) -> usize {
+    pub(super) fn room(&self, chunk: usize) -> usize {
         (self.first_row[chunk + 1] - self.first_row[chunk]) as usize
     }
 
     /// Adds a chunk without copies and with `room` rows behind all others.
-    pub fn add_chunk(&mut self, room: usize) {
+    pub(super) fn add_chunk(&mut self, room: usize) {
         self.first_row.push((self.n_rows() + room) as u32);
     }
 
     /// Replaces the copies of some chunks; each is given with its copies `before`, none for those that had no copies,
     /// and those it has `now`. The rest keeps its rows.
-    pub fn replace<'a>(
+    pub(super) fn replace<'a>(
         &mut self,
         before: impl Iterator<Item = (usize, &'a [u32])>,
         now: impl Iterator<Item = (usize, &'a [u32])>,
@@ -303,19 +307,19 @@ impl Gather {
     }
 
     /// Whether the rows of every chunk still suffice for its copies and the waste bin.
-    pub fn holds<'a>(&self, chunks: impl ExactSizeIterator<Item = &'a [u32]>) -> bool {
+    pub(super) fn holds<'a>(&self, chunks: impl ExactSizeIterator<Item = &'a [u32]>) -> bool {
         let rooms = self.first_row.windows(2).map(|bounds| (bounds[1] - bounds[0]) as usize);
         rooms.len() == chunks.len() && rooms.zip(chunks).all(|(room, copies)| copies.len() < room)
     }
 
     /// Number of rows.
-    pub fn n_rows(&self) -> usize {
+    pub(super) fn n_rows(&self) -> usize {
         self.first_row.last().map_or(1, |&end| end as usize)
     }
 
     /// Adds the sums of the copies of block number `block` to `out`.
     #[inline(always)]
-    pub fn add<const N: usize>(&self, block: usize, rows: &[[f32; N]], out: &mut [[f32; N]]) {
+    pub(super) fn add<const N: usize>(&self, block: usize, rows: &[[f32; N]], out: &mut [[f32; N]]) {
         for (out, &[a, b]) in out.iter_mut().zip(self.pairs(block)) {
             let (a, b) = (&rows[a as usize], &rows[b as usize]);
             for i in 0..N {
@@ -331,7 +335,7 @@ impl Gather {
 
     /// Adds the rows of `copy` to `out`. `further` is 0 at first, and is kept from one call to the next with a higher
     /// number.
-    pub fn rows_of(&self, copy: u32, further: &mut usize, out: &mut Vec<u32>) {
+    pub(super) fn rows_of(&self, copy: u32, further: &mut usize, out: &mut Vec<u32>) {
         out.extend(self.pairs[copy as usize].into_iter().filter(|row| *row != 0));
         *further += self.further[*further..].partition_point(|f| f.0 < copy);
         out.extend(self.further[*further..].iter().take_while(|f| f.0 == copy).map(|f| f.1));
@@ -339,13 +343,13 @@ impl Gather {
 
     /// The first two rows of every copy of block number `block`; row 0 where there are fewer.
     #[inline(always)]
-    pub fn pairs(&self, block: usize) -> &[[u32; 2]] {
+    pub(super) fn pairs(&self, block: usize) -> &[[u32; 2]] {
         &self.pairs[block * BLOCK..((block + 1) * BLOCK).min(self.pairs.len())]
     }
 
     /// The rows that [`Self::pairs`] leaves out: copy within the block, and row.
     #[inline(always)]
-    pub fn further(&self, block: usize) -> impl Iterator<Item = (usize, usize)> {
+    pub(super) fn further(&self, block: usize) -> impl Iterator<Item = (usize, usize)> {
         let further = self.first_further[block] as usize..self.first_further[block + 1] as usize;
         self.further[further].iter().map(move |&(copy, row)| (copy as usize - block * BLOCK, row as usize))
     }

@@ -28,7 +28,7 @@ struct EdgeBatch {
 
 /// s K̂ of one chunk, assembled. Local numbers are below those of the [`Batches`] it is made from.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct EdgeBlocks {
+pub(super) struct EdgeBlocks {
     batches: Vec<EdgeBatch>,
     /// For every batch of tets, pair of corners and lane: 8 · batch + lane of the pair here, or
     /// [`NO_PIECE`].
@@ -40,7 +40,7 @@ pub struct EdgeBlocks {
 
 impl EdgeBlocks {
     /// Lists the pairs of neighbours in `tets`.
-    pub fn new(tets: &Batches) -> Self {
+    pub(super) fn new(tets: &Batches) -> Self {
         let mut blocks = Self { batches: Vec::new(), slots: Vec::new(), pairs: Vec::new(), n_locals: 1 };
         let lanes = (0..tets.n_batches()).flat_map(|t| (0..LANES).map(move |lane| [t, lane]));
         blocks.follow(tets, lanes);
@@ -49,7 +49,7 @@ impl EdgeBlocks {
 
     /// Follows a change: these lanes (batch, lane) of `tets` are new or have other local numbers. New
     /// pairs are appended; pairs that are no longer needed stay, with zeros.
-    pub fn follow(&mut self, tets: &Batches, changed: impl Iterator<Item = [usize; 2]>) {
+    pub(super) fn follow(&mut self, tets: &Batches, changed: impl Iterator<Item = [usize; 2]>) {
         let [before, waste] = [self.n_locals, tets.n_locals()].map(|n| (n - 1) as u16);
         for id in self.batches.iter_mut().flat_map(|b| b.nodes.as_flattened_mut()).filter(|id| **id == before)
         {
@@ -104,7 +104,7 @@ impl EdgeBlocks {
 
     /// Sums the blocks of the tets as they are in `tets`: with the gradients g′ of the kernel,
     /// K_ab = ½ (g′_a·g′_b I + g′_b g′_aᵀ) + λ/2μ g′_a g′_bᵀ.
-    pub fn assemble(&mut self, tets: &Batches) {
+    pub(super) fn assemble(&mut self, tets: &Batches) {
         for batch in &mut self.batches {
             batch.block = [[Lanes::default(); 3]; 3];
         }
@@ -132,7 +132,7 @@ impl EdgeBlocks {
     }
 
     /// y += s K̂ x. `x` and `y` have one entry per local number and the waste bin.
-    pub fn apply(&self, simd: Simd, x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn apply(&self, simd: Simd, x: &[Padded], y: &mut [Padded]) {
         assert!(x.len() == self.n_locals && y.len() == self.n_locals);
         match simd {
             #[cfg(target_arch = "x86_64")]
@@ -143,7 +143,7 @@ impl EdgeBlocks {
     }
 
     /// Bytes that one application streams.
-    pub fn bytes(&self) -> usize {
+    pub(super) fn bytes(&self) -> usize {
         self.batches.len() * size_of::<EdgeBatch>()
     }
 }
@@ -186,7 +186,7 @@ mod avx2 {
     use scindo_matter::element::avx2::Register;
 
     #[target_feature(enable = "avx2,fma")]
-    pub fn apply(batches: &[EdgeBatch], x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn apply(batches: &[EdgeBatch], x: &[Padded], y: &mut [Padded]) {
         super::apply_with::<Register>(batches, x, y);
     }
 }

@@ -14,7 +14,7 @@ const GROUP_ELEMENTS: usize = 1024;
 /// The group of every element, and the material of every group. Cuts do not change them: a piece is in a chunk of its
 /// element's group.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Groups {
+pub(super) struct Groups {
     of_element: Vec<u32>,
     /// Region of every group; 0 is the body's own material.
     regions: Vec<u16>,
@@ -24,7 +24,7 @@ pub struct Groups {
 
 impl Groups {
     /// Divides the elements of each material by recursive bisection of their rest centroids `centres`.
-    pub fn new(centres: &[Vector3<f64>], regions: &Regions) -> Self {
+    pub(super) fn new(centres: &[Vector3<f64>], regions: &Regions) -> Self {
         let constants = regions.constants().to_vec();
         let mut groups = Self { of_element: vec![0; centres.len()], regions: Vec::new(), constants };
         for region in 0..=groups.constants.len() as u16 {
@@ -41,18 +41,18 @@ impl Groups {
     }
 
     /// Number of groups.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.regions.len()
     }
 
     /// Group of element `e`.
     #[inline]
-    pub fn of(&self, e: u32) -> usize {
+    pub(super) fn of(&self, e: u32) -> usize {
         self.of_element[e as usize] as usize
     }
 
     /// Coefficients of a group in an update whose constants are those of the body.
-    pub fn coefficients(&self, group: usize, with: &ElasticUpdate) -> Coefficients {
+    pub(super) fn coefficients(&self, group: usize, with: &ElasticUpdate) -> Coefficients {
         let region = Region::numbered(&self.constants, self.regions[group]);
         Coefficients::of(with, region.map_or(with.lame, Region::lame))
     }
@@ -60,7 +60,7 @@ impl Groups {
 
 impl Coefficients {
     /// Those of an update for a material of these Lamé constants.
-    pub fn of(with: &ElasticUpdate, Lame { mu, lambda }: Lame) -> Self {
+    pub(super) fn of(with: &ElasticUpdate, Lame { mu, lambda }: Lame) -> Self {
         let (scale, rotates) = (with.scale as f32, with.law.rotates());
         Self { mu: mu as f32, lambda: lambda as f32, scale, rotates }
     }

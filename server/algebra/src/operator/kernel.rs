@@ -16,7 +16,7 @@ const AHEAD: usize = 4;
 
 /// The batches of one chunk. Their local numbers are checked once, here.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Batches {
+pub(super) struct Batches {
     /// Those of strips first.
     live: Vec<Batch>,
     rest: Vec<RestBatch>,
@@ -31,7 +31,7 @@ pub struct Batches {
 impl Batches {
     /// Batches with the local numbers `nodes`, all below `n_locals`, and their rest states. The first `n_in_strips` of
     /// them, a multiple of [`strip_kernel::BATCHES`], make up strips.
-    pub fn new(nodes: &[[Ids; 4]], rest: Vec<RestBatch>, n_locals: usize, n_in_strips: usize) -> Self {
+    pub(super) fn new(nodes: &[[Ids; 4]], rest: Vec<RestBatch>, n_locals: usize, n_in_strips: usize) -> Self {
         assert_eq!(nodes.len(), rest.len());
         assert!(nodes.iter().flatten().flatten().all(|&id| (id as usize) < n_locals));
         let zero = Lanes::default();
@@ -43,7 +43,7 @@ impl Batches {
 
     /// Grows to `n_batches` batches, the new ones empty, and to local numbers below `n_locals`. The last
     /// local number becomes the waste bin.
-    pub fn grow(&mut self, n_batches: usize, n_locals: usize) {
+    pub(super) fn grow(&mut self, n_batches: usize, n_locals: usize) {
         assert!(n_batches >= self.live.len() && n_locals >= self.n_locals);
         let [before, waste] = [self.n_locals, n_locals].map(|n| (n - 1) as u16);
         for id in self.live.iter_mut().flat_map(|b| b.nodes.as_flattened_mut()).filter(|id| **id == before) {
@@ -56,7 +56,7 @@ impl Batches {
     }
 
     /// Gives one lane other local numbers.
-    pub fn set_nodes(&mut self, batch: usize, lane: usize, ids: [u16; 4]) {
+    pub(super) fn set_nodes(&mut self, batch: usize, lane: usize, ids: [u16; 4]) {
         assert!(ids.iter().all(|&id| (id as usize) < self.n_locals));
         for (nodes, id) in self.live[batch].nodes.iter_mut().zip(ids) {
             nodes[lane] = id;
@@ -70,17 +70,17 @@ impl Batches {
     }
 
     /// The rest state of one batch.
-    pub fn rest_mut(&mut self, batch: usize) -> &mut RestBatch {
+    pub(super) fn rest_mut(&mut self, batch: usize) -> &mut RestBatch {
         &mut self.rest[batch]
     }
 
     /// λ/2μ at the last update.
-    pub fn ratio(&self) -> f32 {
+    pub(super) fn ratio(&self) -> f32 {
         self.ratio
     }
 
     /// Gradients √(2μ w V s) R g_a and local numbers of the four corners of one lane.
-    pub fn gradients(&self, batch: usize, lane: usize) -> ([[f32; 3]; 4], [u16; 4]) {
+    pub(super) fn gradients(&self, batch: usize, lane: usize) -> ([[f32; 3]; 4], [u16; 4]) {
         let b = &self.live[batch];
         let g: [[f32; 3]; 3] = [0, 1, 2].map(|k| [0, 1, 2].map(|i| b.g[k][i].0[lane]));
         let g0 = [0, 1, 2].map(|i| -(g[0][i] + g[1][i] + g[2][i]));
@@ -88,39 +88,39 @@ impl Batches {
     }
 
     /// Local numbers of the four corners of one lane.
-    pub fn ids(&self, batch: usize, lane: usize) -> [u16; 4] {
+    pub(super) fn ids(&self, batch: usize, lane: usize) -> [u16; 4] {
         self.live[batch].nodes.each_ref().map(|ids| ids[lane])
     }
 
     /// Number of batches.
-    pub fn n_batches(&self) -> usize {
+    pub(super) fn n_batches(&self) -> usize {
         self.live.len()
     }
 
     /// Local numbers are below this; the last is the waste bin.
-    pub fn n_locals(&self) -> usize {
+    pub(super) fn n_locals(&self) -> usize {
         self.n_locals
     }
 
     /// Bytes that one application streams.
-    pub fn bytes(&self) -> usize {
+    pub(super) fn bytes(&self) -> usize {
         self.live.len() * size_of::<Batch>()
     }
 
     /// Asks for what [`Self::apply`] reads first.
     #[inline(always)]
-    pub fn ask_for_first(&self) {
+    pub(super) fn ask_for_first(&self) {
         let n = strip_kernel::AHEAD * strip_kernel::BATCHES;
         prefetch(self.live.get(..n).unwrap_or(&self.live));
     }
 
     /// Rest states and rotations.
-    pub fn rest(&self) -> &[RestBatch] {
+    pub(super) fn rest(&self) -> &[RestBatch] {
         &self.rest
     }
 
     /// y += s K̂ x. `x` and `y` have one entry per local number and the waste bin.
-    pub fn apply(&self, simd: Simd, x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn apply(&self, simd: Simd, x: &[Padded], y: &mut [Padded]) {
         assert!(x.len() == self.n_locals && y.len() == self.n_locals);
         match simd {
             #[cfg(target_arch = "x86_64")]
@@ -135,7 +135,7 @@ impl Batches {
 
     /// Computes rotations, internal forces, rotated gradients and diagonal blocks at the positions in
     /// `locals`. Returns the number of pieces with det F ≤ 0.
-    pub fn update(&mut self, simd: Simd, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+    pub(super) fn update(&mut self, simd: Simd, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
         let n = self.n_locals;
         self.ratio = 0.5 * c.lambda / c.mu;
         assert!(locals.x.len() == n && locals.f.len() == n && locals.blocks.len() == n);
@@ -152,7 +152,7 @@ impl Batches {
 
     /// Elastic energy [J] at the displacements `u` [m], one per local number, with the rotations of the last
     /// update.
-    pub fn energy(&self, simd: Simd, c: EnergyCoefficients, u: &[[f64; 4]]) -> f64 {
+    pub(super) fn energy(&self, simd: Simd, c: EnergyCoefficients, u: &[[f64; 4]]) -> f64 {
         assert!(u.len() == self.n_locals);
         match simd {
             #[cfg(target_arch = "x86_64")]
@@ -319,17 +319,17 @@ mod avx2 {
     use scindo_matter::element::avx2::Register;
 
     #[target_feature(enable = "avx2,fma")]
-    pub fn apply(of: &Batches, x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn apply(of: &Batches, x: &[Padded], y: &mut [Padded]) {
         super::apply_all::<Register, 1>(of, x, y);
     }
 
     #[target_feature(enable = "avx2,fma")]
-    pub fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+    pub(super) fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
         super::update_all::<Register, 1>(of, c, locals)
     }
 
     #[target_feature(enable = "avx2,fma")]
-    pub fn energy(c: EnergyCoefficients, rest: &[RestBatch], live: &[Batch], u: &[[f64; 4]]) -> f64 {
+    pub(super) fn energy(c: EnergyCoefficients, rest: &[RestBatch], live: &[Batch], u: &[[f64; 4]]) -> f64 {
         super::energy_with::<Register>(c, rest, live, u)
     }
 }
@@ -342,12 +342,12 @@ mod avx512 {
     use scindo_matter::element::avx512::Register512;
 
     #[target_feature(enable = "avx512f,avx2,fma")]
-    pub fn apply(of: &Batches, x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn apply(of: &Batches, x: &[Padded], y: &mut [Padded]) {
         super::apply_all::<Register512, 2>(of, x, y);
     }
 
     #[target_feature(enable = "avx512f,avx2,fma")]
-    pub fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+    pub(super) fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
         super::update_all::<Register512, 2>(of, c, locals)
     }
 }

@@ -147,7 +147,7 @@ mod avx {
     use super::{Inverse3, Padded, Start, Sum};
 
     #[target_feature(enable = "avx")]
-    pub fn advance_direction(
+    pub(super) fn advance_direction(
         z: &[Padded],
         beta: f32,
         (mass, factor): (&[f32], f32),
@@ -178,7 +178,7 @@ mod avx {
     }
 
     #[target_feature(enable = "avx")]
-    pub fn advance_solution(
+    pub(super) fn advance_solution(
         alpha: f32,
         [p, q]: [&[Padded]; 2],
         M: &[Inverse3],
@@ -203,7 +203,7 @@ mod avx {
     }
 
     #[target_feature(enable = "avx")]
-    pub fn smooth(
+    pub(super) fn smooth(
         M: &[Inverse3],
         r: &[Padded],
         (start, factors): (Start, [f32; 3]),
@@ -247,7 +247,7 @@ mod avx {
     }
 
     #[target_feature(enable = "avx")]
-    pub fn gather_direction(local: &mut [Padded], copies: &[u32], z: &[Padded], beta: f32) -> usize {
+    pub(super) fn gather_direction(local: &mut [Padded], copies: &[u32], z: &[Padded], beta: f32) -> usize {
         let (turns, beta) = (beta != 0.0, _mm256_set1_ps(beta));
         let (mut done, copies) = (0, copies.as_chunks::<2>().0);
         for (local, &[a, b]) in local.as_chunks_mut::<2>().0.iter_mut().zip(copies) {

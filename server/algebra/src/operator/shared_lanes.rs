@@ -11,7 +11,7 @@ use super::chunks::NO_PIECE;
 
 /// Assignment of pieces to lanes. The *carrier* of a piece is the piece whose lane integrates it.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct SharedLanes {
+pub(super) struct SharedLanes {
     /// For every piece its carrier: the first piece of its element with the same copies.
     of_piece: Vec<u32>,
     /// For every piece what its lane integrates, if it has one.
@@ -27,7 +27,7 @@ pub struct SharedLanes {
 
 /// The pieces of one lane, merged into one.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Merged {
+pub(super) struct Merged {
     /// The carrier, with the sum of the fractions.
     pub piece: Piece,
     /// Number of pieces merged.
@@ -36,7 +36,7 @@ pub struct Merged {
 
 /// Changes of the lanes by a cut.
 #[derive(Debug, Default)]
-pub struct LaneChanges {
+pub(super) struct LaneChanges {
     /// Carriers that were carriers before and have other copies or other pieces now.
     pub amended: Vec<u32>,
     /// New carriers, ascending, and the carrier that had their material before ([`NO_PIECE`] if none).
@@ -45,7 +45,7 @@ pub struct LaneChanges {
 
 impl SharedLanes {
     /// Finds the carriers among the `pieces` of `n_elements` elements.
-    pub fn new(n_elements: usize, pieces: &[Piece]) -> Self {
+    pub(super) fn new(n_elements: usize, pieces: &[Piece]) -> Self {
         let mut carriers = Self { first_in_element: vec![NO_PIECE; n_elements], ..Self::default() };
         let all: Vec<u32> = (0..pieces.len() as u32).collect();
         carriers.follow(pieces, &all);
@@ -54,7 +54,7 @@ impl SharedLanes {
 
     /// Follows a cut; the `changed` pieces (ascending) are new or have other copies or another fraction.
     /// Cuts only ever take copies apart, so a carrier stays one.
-    pub fn follow(&mut self, pieces: &[Piece], changed: &[u32]) -> LaneChanges {
+    pub(super) fn follow(&mut self, pieces: &[Piece], changed: &[u32]) -> LaneChanges {
         let known = self.of_piece.len();
         for p in known as u32..pieces.len() as u32 {
             self.append(p, pieces[p as usize].element);
@@ -133,12 +133,12 @@ impl SharedLanes {
     }
 
     /// The carrier of every piece.
-    pub fn of_piece(&self) -> &[u32] {
+    pub(super) fn of_piece(&self) -> &[u32] {
         &self.of_piece
     }
 
     /// For every piece what its lane integrates; count 0 if it has no lane.
-    pub fn merged(&self) -> &[Merged] {
+    pub(super) fn merged(&self) -> &[Merged] {
         &self.merged
     }
 }

@@ -14,20 +14,20 @@ use super::tet_batch::{Batch, Coefficients, Locals, RestBatch};
 use super::tet_lanes::{Three, edges, forces, read, scatter_block, tet_edges, update_tet};
 
 /// Batches of tets that two batches of strips consist of.
-pub const BATCHES: usize = 2 * TETS;
+pub(super) const BATCHES: usize = 2 * TETS;
 
 /// How many pairs of batches of strips ahead stiffness is asked for: a body of half a million tets streams it from memory.
-pub const AHEAD: usize = 2;
+pub(super) const AHEAD: usize = 2;
 
 /// Whether the tets in every lane of these batches still have a face in common: a cut may have taken them apart.
-pub fn is_joined(batches: &[Batch; BATCHES]) -> bool {
+pub(super) fn is_joined(batches: &[Batch; BATCHES]) -> bool {
     let follows = |before: &Batch, after: &Batch| before.nodes[1..] == after.nodes[..3];
     (0..BATCHES - 2).all(|b| follows(&batches[b], &batches[b + 2]))
 }
 
 /// y += s K̂ x, as many batches of strips at once as V holds.
 #[inline(always)]
-pub fn apply<V: Batched<N>, const N: usize>(
+pub(super) fn apply<V: Batched<N>, const N: usize>(
     [batches, soon]: [&[Batch; BATCHES]; 2],
     ratio: f32,
     x: &[Padded],
@@ -103,7 +103,7 @@ fn scatter<V: Batched<N>, const N: usize>(
 
 /// Updates them in the same way. Returns the number of pieces with det F ≤ 0.
 #[inline(always)]
-pub fn update<V: Batched<N>, const N: usize>(
+pub(super) fn update<V: Batched<N>, const N: usize>(
     c: &Coefficients,
     rest: &mut [RestBatch; BATCHES],
     live: &mut [Batch; BATCHES],

@@ -6,19 +6,19 @@
 use scindo_matter::element::LANES;
 
 /// Tets of a strip.
-pub const TETS: usize = 3;
+pub(super) const TETS: usize = 3;
 /// Copies of a strip.
-pub const NODES: usize = TETS + 3;
+pub(super) const NODES: usize = TETS + 3;
 
 /// Numbers of the corners of a tet in the order in which a lane has them.
-pub type Corners = [u8; 4];
+pub(super) type Corners = [u8; 4];
 
 /// Corners in the order of the mesh.
-pub const AS_IN_MESH: Corners = [0, 1, 2, 3];
+pub(super) const AS_IN_MESH: Corners = [0, 1, 2, 3];
 
 /// Order of the corners of one lane, given those of the batches that are strips. These come first; in all others it is
 /// that of the mesh.
-pub fn corners_of(strips: &[[Corners; LANES]], batch: usize, lane: usize) -> Corners {
+pub(super) fn corners_of(strips: &[[Corners; LANES]], batch: usize, lane: usize) -> Corners {
     strips.get(batch).map_or(AS_IN_MESH, |lanes| lanes[lane])
 }
 
@@ -27,7 +27,7 @@ const NONE: u32 = u32::MAX;
 
 /// Three tets; tet t has the corners `nodes[t]` … `nodes[t + 3]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Strip {
+pub(super) struct Strip {
     /// Numbers of the tets.
     pub tets: [u32; TETS],
     /// Local numbers of its copies.
@@ -36,7 +36,7 @@ pub struct Strip {
 
 impl Strip {
     /// Corners of tet number `t` of the strip, whose copies are `held`, in the order that it has in the strip.
-    pub fn corners(&self, t: usize, held: &[u16; 4]) -> Corners {
+    pub(super) fn corners(&self, t: usize, held: &[u16; 4]) -> Corners {
         let corner = |node: u16| held.iter().position(|&other| other == node).unwrap_or(0) as u8;
         [0, 1, 2, 3].map(|k| corner(self.nodes[t + k]))
     }
@@ -77,7 +77,7 @@ impl Neighbours {
 
 /// Joins tets, each with four different copies, to strips, greedily: those first that have few free neighbours left.
 /// The tets that are in none are left over.
-pub fn find_strips(tets: &[[u16; 4]]) -> Vec<Strip> {
+pub(super) fn find_strips(tets: &[[u16; 4]]) -> Vec<Strip> {
     let neighbours = Neighbours::new(tets);
     let mut used = vec![false; tets.len()];
     let mut strips = Vec::with_capacity(tets.len() / TETS);

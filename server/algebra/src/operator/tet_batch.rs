@@ -14,7 +14,7 @@ pub type Block6 = [f32; 8];
 /// Data that one application streams, per batch of eight pieces.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
-pub struct Batch {
+pub(super) struct Batch {
     /// Rotated gradients √(2μ w V s) R g_k, k = 1, 2, 3, with s the factor of K̂ in the operator;
     /// the one of corner 0 is minus their sum.
     pub g: [[Lanes; 3]; 3],
@@ -25,7 +25,7 @@ pub struct Batch {
 /// Data that only an update needs, per batch.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
-pub struct RestBatch {
+pub(super) struct RestBatch {
     /// Rest gradients g_1, g_2, g_3 [1/m].
     pub g: [[Lanes; 3]; 3],
     /// w V [m³]; 0 in unused lanes.
@@ -38,7 +38,7 @@ pub struct RestBatch {
 
 impl RestBatch {
     /// A batch without pieces: zero volume, R = I.
-    pub fn empty() -> Self {
+    pub(super) fn empty() -> Self {
         let mut rotation: Mat3<Lanes> = Default::default();
         for i in 0..3 {
             rotation[4 * i] = Lanes([1.0; LANES]);
@@ -47,7 +47,7 @@ impl RestBatch {
     }
 
     /// Fills a lane: gradients in the order `corners`, volume, and the rotation if that is known.
-    pub fn set(
+    pub(super) fn set(
         &mut self,
         lane: usize,
         mesh: &TetMesh,
@@ -69,7 +69,7 @@ impl RestBatch {
     }
 
     /// Changes how much material a lane integrates.
-    pub fn set_volume(&mut self, lane: usize, mesh: &TetMesh, merged: &Merged) {
+    pub(super) fn set_volume(&mut self, lane: usize, mesh: &TetMesh, merged: &Merged) {
         let Merged { piece, count } = merged;
         self.volume.0[lane] = (piece.fraction * mesh.volume(piece.element as usize)) as f32;
         self.pieces[lane] = *count;
@@ -78,7 +78,7 @@ impl RestBatch {
 
 /// Constants of one update.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Coefficients {
+pub(super) struct Coefficients {
     /// μ [Pa].
     pub mu: f32,
     /// λ [Pa].
@@ -91,7 +91,7 @@ pub struct Coefficients {
 
 /// Constants of an energy.
 #[derive(Clone, Copy, Debug)]
-pub struct EnergyCoefficients {
+pub(super) struct EnergyCoefficients {
     /// μ [Pa].
     pub mu: f32,
     /// λ [Pa].
@@ -101,7 +101,7 @@ pub struct EnergyCoefficients {
 }
 
 /// Vectors of one chunk, one entry per local number and one for the waste bin.
-pub struct Locals<'a> {
+pub(super) struct Locals<'a> {
     /// Current positions [m] in double precision.
     pub x: &'a [[f64; 4]],
     /// Out: internal forces f_int [N], added to.

@@ -17,16 +17,16 @@ use scindo_matter::element::{
 use super::tet_batch::{Batch, Block6, Coefficients, RestBatch};
 
 /// Three numbers per lane.
-pub type Three<V> = [V; 3];
+pub(super) type Three<V> = [V; 3];
 
 #[inline(always)]
-pub fn load<V: Vector8>(l: &[Lanes; 3]) -> [V; 3] {
+pub(super) fn load<V: Vector8>(l: &[Lanes; 3]) -> [V; 3] {
     [V::load(&l[0]), V::load(&l[1]), V::load(&l[2])]
 }
 
 /// Reads three vectors of every batch.
 #[inline(always)]
-pub fn read<V: Batched<N>, const N: usize, B>(
+pub(super) fn read<V: Batched<N>, const N: usize, B>(
     from: &[B; N],
     field: impl Fn(&B) -> &[[Lanes; 3]; 3],
 ) -> [[V; 3]; 3] {
@@ -45,19 +45,19 @@ fn product<V: Vector>(A: &[[V; 3]; 3], v: &[V; 3]) -> [V; 3] {
 }
 
 #[inline(always)]
-pub fn dot<V: Vector>(a: &[V; 3], b: &[V; 3]) -> V {
+pub(super) fn dot<V: Vector>(a: &[V; 3], b: &[V; 3]) -> V {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
 /// The vector of corner 0, given that the vectors of all corners sum to 0.
 #[inline(always)]
-pub fn minus_sum<V: Vector>(v: &[[V; 3]; 3]) -> [V; 3] {
+pub(super) fn minus_sum<V: Vector>(v: &[[V; 3]; 3]) -> [V; 3] {
     [-(v[0][0] + v[1][0] + v[2][0]), -(v[0][1] + v[1][1] + v[2][1]), -(v[0][2] + v[1][2] + v[2][2])]
 }
 
 /// H_ij = Σ_k d_k,i g_k,j.
 #[inline(always)]
-pub fn sum_of_outer_products<V: Vector>(d: &[[V; 3]; 3], g: &[[V; 3]; 3]) -> [[V; 3]; 3] {
+pub(super) fn sum_of_outer_products<V: Vector>(d: &[[V; 3]; 3], g: &[[V; 3]; 3]) -> [[V; 3]; 3] {
     let mut H = *d;
     for i in 0..3 {
         for j in 0..3 {
@@ -69,7 +69,7 @@ pub fn sum_of_outer_products<V: Vector>(d: &[[V; 3]; 3], g: &[[V; 3]; 3]) -> [[V
 
 /// The vectors from one point to three others.
 #[inline(always)]
-pub fn edges<V: Vector>(from: Three<V>, a: Three<V>, b: Three<V>, c: Three<V>) -> [Three<V>; 3] {
+pub(super) fn edges<V: Vector>(from: Three<V>, a: Three<V>, b: Three<V>, c: Three<V>) -> [Three<V>; 3] {
     let mut d = [a, b, c];
     for k in 0..3 {
         for i in 0..3 {
@@ -81,7 +81,7 @@ pub fn edges<V: Vector>(from: Three<V>, a: Three<V>, b: Three<V>, c: Three<V>) -
 
 /// Forces σ g′_k on the corners k = 1, 2, 3, and on corner 0, of tets with the edges `d` from corner 0.
 #[inline(always)]
-pub fn forces<V: Vector>(g: &[Three<V>; 3], d: &[Three<V>; 3], ratio: V) -> [Three<V>; 4] {
+pub(super) fn forces<V: Vector>(g: &[Three<V>; 3], d: &[Three<V>; 3], ratio: V) -> [Three<V>; 4] {
     let half = V::splat(0.5);
     let H = sum_of_outer_products(d, g);
     let pressure = ratio * (H[0][0] + H[1][1] + H[2][2]);
@@ -96,7 +96,7 @@ pub fn forces<V: Vector>(g: &[Three<V>; 3], d: &[Three<V>; 3], ratio: V) -> [Thr
 
 /// What an update finds for one tet per lane.
 #[derive(Clone, Copy)]
-pub struct UpdatedTet<V> {
+pub(super) struct UpdatedTet<V> {
     /// Internal forces [N] on the four corners.
     pub f: [Three<V>; 4],
     /// Diagonal blocks (xx, xy, xz, yy, yz, zz) of s K̂ of the four corners.
@@ -107,7 +107,7 @@ pub struct UpdatedTet<V> {
 
 /// Updates rotations and rotated gradients of tets with the edges `e` from corner 0.
 #[inline(always)]
-pub fn update_tet<V: Batched<N>, const N: usize>(
+pub(super) fn update_tet<V: Batched<N>, const N: usize>(
     c: &Coefficients,
     e: &[Three<V>; 3],
     rest: &mut [RestBatch; N],
@@ -239,7 +239,7 @@ fn piola_stress<V: Vector>(F: &[[V; 3]; 3], R: &[[V; 3]; 3], two_mu_volume: V, r
 
 /// Edges from corner 0 of every tet, at the positions `x`.
 #[inline(always)]
-pub fn tet_edges<V: Batched<N>, const N: usize>(x: &[[f64; 4]], live: &[Batch; N]) -> [Three<V>; 3] {
+pub(super) fn tet_edges<V: Batched<N>, const N: usize>(x: &[[f64; 4]], live: &[Batch; N]) -> [Three<V>; 3] {
     // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
     unsafe {
         [
@@ -252,7 +252,7 @@ pub fn tet_edges<V: Batched<N>, const N: usize>(x: &[[f64; 4]], live: &[Batch; N
 
 /// Adds diagonal blocks of copies of one batch.
 #[inline(always)]
-pub fn scatter_block<V: Batched<N>, const N: usize>(
+pub(super) fn scatter_block<V: Batched<N>, const N: usize>(
     to: &mut [Block6],
     ids: &Ids,
     block: &[V; 6],

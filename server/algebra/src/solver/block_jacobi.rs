@@ -61,7 +61,7 @@ fn rounded<T: Real>(M: Matrix3<f64>) -> Matrix3<T> {
 }
 
 /// √s of a sum that only rounding can make negative; NaN stays NaN.
-pub fn root(s: f64) -> f64 {
+pub(super) fn root(s: f64) -> f64 {
     if s < 0.0 { 0.0 } else { s.sqrt() }
 }
 

@@ -22,14 +22,14 @@ const RELIABLE: f64 = 0.1;
 const FUTILE: u32 = 2;
 
 /// A matrix that is multiplied row by row.
-pub trait Rows<T>: Sync {
+pub(super) trait Rows<T>: Sync {
     /// Row `i` of A x.
     fn times(&self, i: usize, x: &[Vector3<T>]) -> Vector3<T>;
 }
 
 /// A filtered matrix with its diagonal, in double precision and in that of the iteration.
 #[derive(Clone, Copy, Debug)]
-pub struct System<'a, T, A> {
+pub(super) struct System<'a, T, A> {
     /// A, for true residuals.
     pub exact: &'a BlockCsr<f64>,
     /// A, rounded to the precision of the iteration.
@@ -48,7 +48,7 @@ pub struct System<'a, T, A> {
 
 /// Stopping criteria of conjugate gradients.
 #[derive(Clone, Copy, Debug)]
-pub struct Stop {
+pub(super) struct Stop {
     /// √(rᵀM⁻¹r) to reach, not relative to anything.
     pub target: f64,
     /// Largest number of iterations.
@@ -58,7 +58,7 @@ pub struct Stop {
 /// Scratch vectors, one entry per copy; reused from solve to solve.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 #[serde(bound(serialize = "T: Real + serde::Serialize", deserialize = "T: Real + serde::Deserialize<'de>"))]
-pub struct ConjugateGradients<T> {
+pub(super) struct ConjugateGradients<T> {
     r: Vec<Vector3<T>>,
     z: Vec<Vector3<T>>,
     p: Vec<Vector3<T>>,
@@ -89,7 +89,7 @@ where
     /// Improves `x` until the true residual is small enough; prescribed directions of `x` stay.
     ///
     /// The residual of the report is not relative: the caller divides by its reference.
-    pub fn solve(
+    pub(super) fn solve(
         &mut self,
         team: &mut Team,
         system: &System<'_, T, impl Rows<T>>,

@@ -11,14 +11,14 @@ use crate::assembly::BlockCsr;
 /// the *strain* and not to the displacement. Applied plainly, rounding of A stiffens the softest
 /// modes, and the iteration has to be corrected every ten iterations or so.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Differences {
+pub(super) struct Differences {
     matrix: BlockCsr<f32>,
     row_sums: Vec<[f32; 9]>,
 }
 
 impl Differences {
     /// Rounds `A`; allocates only where its pattern has changed.
-    pub fn update(&mut self, A: &BlockCsr<f64>) {
+    pub(super) fn update(&mut self, A: &BlockCsr<f64>) {
         A.to_f32(&mut self.matrix);
         self.row_sums.resize(A.n_rows(), [0.0; 9]);
         for (i, sum) in self.row_sums.iter_mut().enumerate() {

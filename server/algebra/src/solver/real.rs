@@ -34,6 +34,6 @@ impl Real for f64 {
 
 /// x · y, in double precision.
 #[inline(always)]
-pub fn dot<T: Real>(x: &Vector3<T>, y: &Vector3<T>) -> f64 {
+pub(super) fn dot<T: Real>(x: &Vector3<T>, y: &Vector3<T>) -> f64 {
     x.x.wide() * y.x.wide() + x.y.wide() * y.y.wide() + x.z.wide() * y.z.wide()
 }

@@ -13,7 +13,7 @@ use crate::operator::{StiffModes, Substitution};
 
 /// A substitution T, found anew whenever other copies are held.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Substituted {
+pub(super) struct Substituted {
     modes: Option<Arc<StiffModes>>,
     T: Substitution,
     /// Degenerate pieces that keep a stiff motion.
@@ -24,23 +24,23 @@ pub struct Substituted {
 
 impl Substituted {
     /// The substitution for `modes`; the first update finds it.
-    pub fn new(modes: Option<Arc<StiffModes>>) -> Self {
+    pub(super) fn new(modes: Option<Arc<StiffModes>>) -> Self {
         Self { modes, ..Self::default() }
     }
 
     /// T; empty if nothing is substituted.
-    pub fn substitution(&self) -> &Substitution {
+    pub(super) fn substitution(&self) -> &Substitution {
         &self.T
     }
 
     /// Numbers of degenerate pieces, of copies moved relative to others, and of degenerate pieces that
     /// keep a stiff motion.
-    pub fn counts(&self) -> [usize; 3] {
+    pub(super) fn counts(&self) -> [usize; 3] {
         [self.modes.as_ref().map_or(0, |modes| modes.n_degenerate()), self.T.len(), self.left]
     }
 
     /// Puts the inverse diagonal blocks of TᵀA T in place of those of A, if `wanted`.
-    pub fn update(
+    pub(super) fn update(
         &mut self,
         A: &BlockCsr<f64>,
         filter: &Filter,
@@ -73,7 +73,7 @@ impl Substituted {
     }
 
     /// √(rᵀT M⁻¹Tᵀr).
-    pub fn norm(&self, M: &DiagonalInverse<f64>, r: &[Vector3<f64>]) -> f64 {
+    pub(super) fn norm(&self, M: &DiagonalInverse<f64>, r: &[Vector3<f64>]) -> f64 {
         if self.T.is_empty() {
             return M.norm(r);
         }
@@ -87,7 +87,7 @@ impl Substituted {
     }
 
     /// z = T M⁻¹ Tᵀ r.
-    pub fn apply(&self, M: &DiagonalInverse<f64>, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
+    pub(super) fn apply(&self, M: &DiagonalInverse<f64>, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
         M.apply(r, z);
         for (copy, column) in self.T.columns() {
             z[copy as usize] = M.times(copy as usize, &folded(column, r));

@@ -13,11 +13,11 @@ pub(crate) struct Aabb {
 
 impl Aabb {
     /// The box without a point: the neutral element of [`merged`](Self::merged).
-    pub const EMPTY: Self = Self { min: [f32::MAX; 3], max: [f32::MIN; 3] };
+    pub(crate) const EMPTY: Self = Self { min: [f32::MAX; 3], max: [f32::MIN; 3] };
 
     /// The smallest box around both.
     #[inline(always)]
-    pub fn merged(&self, other: &Self) -> Self {
+    pub(crate) fn merged(&self, other: &Self) -> Self {
         Self { min: lower(self.min, other.min), max: upper(self.max, other.max) }
     }
 
@@ -26,43 +26,43 @@ impl Aabb {
     /// Rounding is monotone, so with a `margin` that was rounded up no pair is missed; with margin zero the
     /// answer is exact.
     #[inline(always)]
-    pub fn within(&self, other: &Self, margin: f32) -> bool {
+    pub(crate) fn within(&self, other: &Self, margin: f32) -> bool {
         let near = |i: usize| (self.min[i] - other.max[i] <= margin) & (other.min[i] - self.max[i] <= margin);
         near(0) & near(1) & near(2)
     }
 
     /// [`within`](Self::within) without rounding.
-    pub fn within_exactly(&self, other: &Self, margin: f64) -> bool {
+    pub(crate) fn within_exactly(&self, other: &Self, margin: f64) -> bool {
         let gap = |low: f32, high: f32| f64::from(low) - f64::from(high);
         (0..3).all(|i| gap(self.min[i], other.max[i]) <= margin && gap(other.min[i], self.max[i]) <= margin)
     }
 
     /// Centre [m].
     #[inline(always)]
-    pub fn centre(&self) -> [f32; 3] {
+    pub(crate) fn centre(&self) -> [f32; 3] {
         [0, 1, 2].map(|i| 0.5 * self.min[i] + 0.5 * self.max[i])
     }
 
     /// Edge lengths [m]; negative where it is empty.
     #[inline(always)]
-    pub fn extents(&self) -> [f32; 3] {
+    pub(crate) fn extents(&self) -> [f32; 3] {
         [0, 1, 2].map(|i| self.max[i] - self.min[i])
     }
 
     /// Half the surface area [m²]; 0 where it is empty.
     #[inline(always)]
-    pub fn half_area(&self) -> f32 {
+    pub(crate) fn half_area(&self) -> f32 {
         let [x, y, z] = self.extents();
         if x < 0.0 { 0.0 } else { x * y + y * z + z * x }
     }
 
     /// Lower and upper corner in double precision [m].
-    pub fn corners(&self) -> [Vector3<f64>; 2] {
+    pub(crate) fn corners(&self) -> [Vector3<f64>; 2] {
         [self.min, self.max].map(|p| Vector3::from(p.map(f64::from)))
     }
 
     /// The smallest box with these corners in single precision [m].
-    pub fn outside([min, max]: [Vector3<f64>; 2]) -> Self {
+    pub(crate) fn outside([min, max]: [Vector3<f64>; 2]) -> Self {
         Self { min: [0, 1, 2].map(|i| round_down(min[i])), max: [0, 1, 2].map(|i| round_up(max[i])) }
     }
 }

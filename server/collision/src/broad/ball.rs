@@ -13,11 +13,11 @@ pub(crate) struct Ball {
 
 impl Ball {
     /// The sphere without a point: the neutral element of [`merged`](Self::merged).
-    pub const EMPTY: Self = Self { centre: [0.0; 3], radius: -1.0 };
+    pub(crate) const EMPTY: Self = Self { centre: [0.0; 3], radius: -1.0 };
 
     /// The sphere around the middle of some boxes that holds all of them.
     #[inline(always)]
-    pub fn around<'a>(boxes: impl Iterator<Item = &'a Aabb> + Clone) -> Self {
+    pub(crate) fn around<'a>(boxes: impl Iterator<Item = &'a Aabb> + Clone) -> Self {
         let whole = boxes.clone().fold(Aabb::EMPTY, |sum, aabb| sum.merged(aabb));
         if whole.extents()[0] < 0.0 {
             return Self::EMPTY;
@@ -33,7 +33,7 @@ impl Ball {
 
     /// The smallest sphere around two, up to rounding.
     #[inline(always)]
-    pub fn merged(&self, other: &Self) -> Self {
+    pub(crate) fn merged(&self, other: &Self) -> Self {
         if self.radius < 0.0 {
             return *other;
         }
@@ -61,20 +61,20 @@ impl Ball {
     }
 
     /// Distance of the centres [m].
-    pub fn distance(&self, other: &Self) -> f64 {
+    pub(crate) fn distance(&self, other: &Self) -> f64 {
         let squared = |i: usize| (f64::from(self.centre[i]) - f64::from(other.centre[i])).powi(2);
         (squared(0) + squared(1) + squared(2)).sqrt()
     }
 
     /// Whether boxes inside the two spheres can be as near as `margin` [m] along every axis.
-    pub fn within(&self, other: &Self, margin: f32) -> bool {
+    pub(crate) fn within(&self, other: &Self, margin: f32) -> bool {
         // Boxes that are `margin` apart along three axes are up to √3 margin apart.
         let reach = f64::from(self.radius) + f64::from(other.radius) + 1.733 * f64::from(margin);
         self.radius >= 0.0 && other.radius >= 0.0 && self.distance(other) <= reach * (1.0 + 1e-12)
     }
 
     /// The box around the sphere.
-    pub fn aabb(&self) -> Aabb {
+    pub(crate) fn aabb(&self) -> Aabb {
         let r = f64::from(self.radius);
         let at = |side: f64| nalgebra::Vector3::from(self.centre.map(|c| f64::from(c) + side * r));
         Aabb::outside([at(-1.0), at(1.0)])
@@ -82,7 +82,7 @@ impl Ball {
 
     /// A measure of the surface area [m²], comparable to half the area of a box.
     #[inline(always)]
-    pub fn half_area(&self) -> f32 {
+    pub(crate) fn half_area(&self) -> f32 {
         let r = self.radius.max(0.0);
         std::f32::consts::TAU * r * r
     }

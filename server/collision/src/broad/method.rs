@@ -66,7 +66,7 @@ macro_rules! each {
 
 impl Index {
     /// Arranges boxes by `method`.
-    pub fn new(method: Method, boxes: &[Aabb]) -> Self {
+    pub(crate) fn new(method: Method, boxes: &[Aabb]) -> Self {
         let mut index = match method {
             Method::AabbTree => Self::AabbTree(Tree::default()),
             Method::Octree => Self::Octree(Tree::default()),
@@ -79,7 +79,7 @@ impl Index {
     }
 
     /// The method.
-    pub fn method(&self) -> Method {
+    pub(crate) fn method(&self) -> Method {
         match self {
             Self::AabbTree(_) => Method::AabbTree,
             Self::Octree(_) => Method::Octree,

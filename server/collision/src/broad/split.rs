@@ -20,12 +20,12 @@ impl<C: Copy> Groups<C> {
     }
 
     /// Number of children.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.len
     }
 
     /// Size and cell of each child, in the order of the items.
-    pub fn iter(&self) -> impl Iterator<Item = (usize, C)> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (usize, C)> {
         self.sizes.into_iter().zip(self.cells).take(self.len)
     }
 }

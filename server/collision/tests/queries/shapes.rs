@@ -6,10 +6,10 @@ use fastrand::Rng;
 use nalgebra::Vector3;
 
 /// Positions [m] and outward triangles.
-pub type Surface = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+pub(crate) type Surface = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
 /// A cube of half edge `half` [m] whose faces are split into `n` x `n` quads.
-pub fn block(half: [f32; 3], n: usize) -> Surface {
+pub(crate) fn block(half: [f32; 3], n: usize) -> Surface {
     let mut index = BTreeMap::new();
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
@@ -44,12 +44,12 @@ pub fn block(half: [f32; 3], n: usize) -> Surface {
 }
 
 /// Uniform in the cube of half width `r` around the origin.
-pub fn vector(random: &mut Rng, r: f64) -> Vector3<f64> {
+pub(crate) fn vector(random: &mut Rng, r: f64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| (2.0 * random.f64() - 1.0) * r)
 }
 
 /// A ball of radius `radius` [m]: a cube's faces blown up.
-pub fn ball(radius: f32, n: usize) -> Surface {
+pub(crate) fn ball(radius: f32, n: usize) -> Surface {
     let (mut positions, triangles) = block([1.0; 3], n);
     for p in &mut positions {
         let norm = p.iter().map(|x| x * x).sum::<f32>().sqrt();

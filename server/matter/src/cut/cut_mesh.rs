@@ -238,11 +238,25 @@ impl CutMesh {
     /// The faces of piece `p` on the skin, without lips of cuts: the barycentric coordinates of their corners in the
     /// element, counter-clockwise from outside.
     pub fn skin_fragments(&self, p: usize) -> impl Iterator<Item = [[f64; 4]; 3]> + '_ {
+        self.piece_faces(p, |neighbour, tag| neighbour == NONE && tag == 0)
+    }
+
+    /// The faces of piece `p` on lips of cuts, like [`skin_fragments`](Self::skin_fragments).
+    pub fn lip_fragments(&self, p: usize) -> impl Iterator<Item = [[f64; 4]; 3]> + '_ {
+        self.piece_faces(p, |_, tag| tag > 0)
+    }
+
+    /// The faces of the fragments of piece `p` that are chosen by their neighbour and their tag.
+    fn piece_faces(
+        &self,
+        p: usize,
+        chosen: fn(u32, u32) -> bool,
+    ) -> impl Iterator<Item = [[f64; 4]; 3]> + '_ {
         let (fragments, nodes) = (&self.fragments, self.mesh.tets[self.pieces()[p].element as usize]);
         let of_fragment = move |t: u32| {
             let t = t as usize;
-            let is_skin = move |k: &usize| fragments.neighbour[t][*k] == NONE && fragments.tag[t][*k] == 0;
-            (0..4).filter(is_skin).map(move |k| {
+            let is_chosen = move |k: &usize| chosen(fragments.neighbour[t][*k], fragments.tag[t][*k]);
+            (0..4).filter(is_chosen).map(move |k| {
                 let corner = |v: u32| nodes.map(|node| fragments.vertices[v as usize].weight_of(node));
                 TET_FACES[k].map(|slot| corner(fragments.tets[t][slot]))
             })

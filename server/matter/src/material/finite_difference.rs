@@ -6,7 +6,7 @@ use super::Matrix9;
 
 /// Deformation gradients: rest, stretched and rotated, strongly compressed, inverted, nearly flat, with
 /// repeated stretches, and with one stretch just beside a repeated one.
-pub fn samples() -> Vec<Matrix3<f64>> {
+pub(super) fn samples() -> Vec<Matrix3<f64>> {
     let turned = Rotation3::new(Vector3::new(0.4, -1.1, 0.7)).into_inner();
     let sheared = Matrix3::new(1.2, 0.3, -0.1, 0.05, 0.8, 0.2, -0.3, 0.1, 1.1);
     let stretches = |a, b, c| Matrix3::from_diagonal(&Vector3::new(a, b, c));
@@ -26,7 +26,7 @@ pub fn samples() -> Vec<Matrix3<f64>> {
 }
 
 /// Compares P with differences of ψ, and ∂P/∂F with differences of P, at F.
-pub fn assert_triad(
+pub(super) fn assert_triad(
     F: &Matrix3<f64>,
     energy: impl Fn(&Matrix3<f64>) -> f64,
     stress: impl Fn(&Matrix3<f64>) -> Matrix3<f64>,
@@ -36,7 +36,7 @@ pub fn assert_triad(
 }
 
 /// The same with differences over ±`h` and a tolerance relative to 1 + size.
-pub fn assert_triad_within(
+pub(super) fn assert_triad_within(
     F: &Matrix3<f64>,
     h: f64,
     bound: f64,

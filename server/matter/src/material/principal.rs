@@ -28,12 +28,12 @@ pub(super) struct Principal {
 
 impl Principal {
     /// ∂ψ/∂F = U diag(∂ψ/∂σ) Vᵀ.
-    pub fn gradient(&self, svd: &SignedSvd) -> Matrix3<f64> {
+    pub(super) fn gradient(&self, svd: &SignedSvd) -> Matrix3<f64> {
         svd.compose(&self.slope)
     }
 
     /// The same with every negative eigenvalue set to 0, which is the nearest positive semidefinite tangent.
-    pub fn projected(mut self) -> Self {
+    pub(super) fn projected(mut self) -> Self {
         let eigen = self.scaling.symmetric_eigen();
         if eigen.eigenvalues.min() < 0.0 {
             let Q = eigen.eigenvectors;
@@ -45,7 +45,7 @@ impl Principal {
     }
 
     /// ∂²ψ/∂F², with F stacked by columns.
-    pub fn hessian(&self, svd: &SignedSvd) -> Matrix9 {
+    pub(super) fn hessian(&self, svd: &SignedSvd) -> Matrix9 {
         let SignedSvd { U, V, .. } = svd;
         let mut H = Matrix9::zeros();
         for column in 0..3 {

@@ -199,7 +199,7 @@ fn split_cells(lattice: &Lattice, fine: &Bits) -> Vec<Bits> {
 }
 
 /// Calls `visit` for a cell and the 26 around it.
-pub fn for_around(at: At, mut visit: impl FnMut(At)) {
+pub(super) fn for_around(at: At, mut visit: impl FnMut(At)) {
     for dz in -1..=1 {
         for dy in -1..=1 {
             for dx in -1..=1 {
@@ -219,7 +219,7 @@ fn emit(at: At, level: u8, split: &[Bits], leaf: &mut impl FnMut(At, u8)) {
 }
 
 /// Low corner of child `child` of a cell with sides of 2^level; bit k of `child` is its half along axis k.
-pub fn child_corner(at: At, level: u8, child: usize) -> At {
+pub(super) fn child_corner(at: At, level: u8, child: usize) -> At {
     let half = 1 << (level - 1);
     [0, 1, 2].map(|k| at[k] + half * (child >> k & 1) as i32)
 }

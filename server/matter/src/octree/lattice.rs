@@ -9,7 +9,7 @@ pub type At = [i32; 3];
 pub const DIRECTIONS: [At; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
 
 /// The six neighbours of a cell, in the order of [`DIRECTIONS`].
-pub fn neighbours(at: At) -> [At; 6] {
+pub(super) fn neighbours(at: At) -> [At; 6] {
     DIRECTIONS.map(|d| [0, 1, 2].map(|k| at[k] + d[k]))
 }
 

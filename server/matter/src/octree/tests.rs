@@ -7,13 +7,13 @@ use super::*;
 use crate::cut::BladeSweep;
 use crate::team::Team;
 
-pub fn cube(cells: u32, levels: u8) -> Octree {
+pub(super) fn cube(cells: u32, levels: u8) -> Octree {
     let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
     Octree::fill(&shape, OctreeSettings { cells, levels }, &|_| 0).unwrap()
 }
 
 /// A torus-like solid with a spike and a thin sheet.
-pub struct Odd;
+pub(super) struct Odd;
 
 impl Shape for Odd {
     fn bounds(&self) -> [Vector3<f64>; 2] {
@@ -32,7 +32,7 @@ impl Shape for Odd {
 }
 
 /// The vertices of an octree by their definition: slots of cells joined over faces, without the shortcut of octants.
-pub fn check_vertices(octree: &Octree) {
+pub(super) fn check_vertices(octree: &Octree) {
     let cells = octree.cells();
     for (id, cell) in cells.iter().enumerate() {
         let W = corner_weights(cell, octree.hanging()[id]);
@@ -144,7 +144,7 @@ fn a_solid_that_no_cell_can_fill_is_refused() {
     assert!(matches!(Octree::fill(&cube, settings, &|_| 0), Err(OctreeError::TooMany { .. })));
 }
 
-pub fn link(incision: u32) -> CutLink {
+pub(super) fn link(incision: u32) -> CutLink {
     CutLink { at: [0.5; 2], normal: [Vector3::x(); 2], incision }
 }
 
@@ -239,7 +239,7 @@ fn random_cuts_keep_eight_vertices_per_cell_and_the_field_and_momentum() {
 }
 
 /// The vertices are those that numbering from scratch finds, up to their numbers.
-pub fn check_numbering(octree: &Octree) {
+pub(super) fn check_numbering(octree: &Octree) {
     let mut anew = octree.clone();
     anew.points.clear();
     anew.vertices.iter_mut().for_each(|v| *v = [OUTSIDE; 8]);

@@ -5,7 +5,7 @@ use crate::mesh::{TET_FACES, TetMesh};
 
 /// One boundary face of the uncut body.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
-pub struct BaseFace {
+pub(super) struct BaseFace {
     /// Element it belongs to, or [`NONE`] if the boundary is a surface of its own.
     pub element: u32,
     /// Its nodes, counter-clockwise seen from outside.
@@ -20,7 +20,7 @@ pub struct BaseFace {
 
 /// All boundary faces of the uncut mesh.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Base {
+pub(super) struct Base {
     /// The faces.
     pub faces: Vec<BaseFace>,
     /// Number of distinct edges.
@@ -33,7 +33,7 @@ pub struct Base {
 
 impl Base {
     /// The boundary of a fragment mesh without cuts.
-    pub fn new(mesh: &TetMesh, fragments: &Fragments) -> Self {
+    pub(super) fn new(mesh: &TetMesh, fragments: &Fragments) -> Self {
         let mut base = Self { face_at: vec![NONE; 4 * mesh.tets.len()], ..Self::default() };
         let mut place = Vec::new();
         for (e, tet) in (0u32..).zip(&mesh.tets) {
@@ -63,7 +63,7 @@ impl Base {
     }
 
     /// Any closed surface. `twin` is the opposite of half-edge 3·face + k, which runs from corner k to the next.
-    pub fn of_surface(triangles: &[[u32; 3]], twin: &[usize]) -> Self {
+    pub(super) fn of_surface(triangles: &[[u32; 3]], twin: &[usize]) -> Self {
         let face = |&nodes: &[u32; 3]| BaseFace {
             element: NONE,
             nodes,
@@ -99,13 +99,13 @@ impl Base {
     }
 
     /// Boundary faces of element `e`.
-    pub fn faces_of(&self, e: u32) -> impl Iterator<Item = u32> {
+    pub(super) fn faces_of(&self, e: u32) -> impl Iterator<Item = u32> {
         let at = 4 * e as usize;
         self.face_at[at..at + 4].iter().copied().filter(|&f| f != NONE)
     }
 
     /// The two faces at each edge.
-    pub fn across(&self) -> Vec<[u32; 2]> {
+    pub(super) fn across(&self) -> Vec<[u32; 2]> {
         let mut across = vec![[NONE; 2]; self.n_edges];
         for (f, face) in (0u32..).zip(&self.faces) {
             for (&edge, &forward) in face.edges.iter().zip(&face.forward) {
@@ -116,7 +116,7 @@ impl Base {
     }
 
     /// The faces at each corner.
-    pub fn faces_at_corners(&self) -> Vec<Vec<u32>> {
+    pub(super) fn faces_at_corners(&self) -> Vec<Vec<u32>> {
         let mut faces = vec![Vec::new(); self.n_corners];
         for (f, face) in (0u32..).zip(&self.faces) {
             face.corners.iter().for_each(|&corner| faces[corner as usize].push(f));
@@ -126,7 +126,7 @@ impl Base {
 
     /// The boundary face that contains the face of fragment `t` opposite its vertex `face`, if that face is
     /// part of the skin.
-    pub fn under(&self, mesh: &TetMesh, fragments: &Fragments, t: u32, face: usize) -> Option<u32> {
+    pub(super) fn under(&self, mesh: &TetMesh, fragments: &Fragments, t: u32, face: usize) -> Option<u32> {
         let e = fragments.element[t as usize] as usize;
         let nodes = mesh.tets[e];
         let corners = TET_FACES[face].map(|c| &fragments.vertices[fragments.tets[t as usize][c] as usize]);

@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::sheet::Sheet;
 
 /// Most parts into which an edge of an element is divided.
-pub const MAX_DIVISIONS: usize = 32;
+pub(super) const MAX_DIVISIONS: usize = 32;
 /// Most skin triangles of one body: a bound on memory.
 const MAX_TRIANGLES: usize = 4_000_000;
 
@@ -44,12 +44,12 @@ pub enum SkinError {
 }
 
 /// Refuses a skin with this many triangles if they are too many.
-pub fn check_size(found: usize) -> Result<(), SkinError> {
+pub(super) fn check_size(found: usize) -> Result<(), SkinError> {
     if found > MAX_TRIANGLES { Err(SkinError::TooFine { found }) } else { Ok(()) }
 }
 
 /// Refuses a skin with too many triangles, and with points that rest nowhere.
-pub fn check(sheet: &Sheet) -> Result<(), SkinError> {
+pub(super) fn check(sheet: &Sheet) -> Result<(), SkinError> {
     check_size(sheet.corners.len())?;
     match sheet.points.iter().position(|p| !p.place.iter().all(|c| c.is_finite())) {
         Some(point) => Err(SkinError::NonFinitePlace { point }),

@@ -20,7 +20,7 @@ use crate::cut::{CutMesh, IncisionMark, MarkPoint, Surface};
 const SHORT: f64 = 1e-6;
 
 /// Appends the parts of a line, one for every skin triangle over it. A line on a lip is not divided.
-pub fn lift(
+pub(super) fn lift(
     base: &Base,
     sheet: &Sheet,
     (join, surface): (&SkinJoin, &Surface),

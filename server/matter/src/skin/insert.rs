@@ -13,10 +13,10 @@ use crate::cut::topology::fragments::{FragmentVertex, NONE};
 /// Share of a triangle or edge below which a point counts as lying on the border.
 ///
 /// Far above rounding of coordinates (1e-16), far below what shows.
-pub const ON: f64 = 1e-9;
+pub(super) const ON: f64 = 1e-9;
 
 /// Share below which two vertices are the same point, e.g. one crossing on both lips of an older cut.
-pub const SAME: f64 = 1e-12;
+pub(super) const SAME: f64 = 1e-12;
 
 /// Where a new point is inserted.
 enum Spot {
@@ -31,7 +31,7 @@ enum Spot {
 impl Sheet {
     /// The skin point that represents a fragment vertex over face `f`. `snapping` in [0, 0.5] is the relative
     /// distance within which a corner is moved instead of splitting its triangle.
-    pub fn insert_point(&mut self, base: &Base, f: u32, at: &FragmentVertex, snapping: f64) -> u32 {
+    pub(super) fn insert_point(&mut self, base: &Base, f: u32, at: &FragmentVertex, snapping: f64) -> u32 {
         let face = &base.faces[f as usize];
         let w = Self::coordinates(base, f, at);
         if let Some(k) = (0..3).find(|&k| w[(k + 1) % 3] == 0.0 && w[(k + 2) % 3] == 0.0) {
@@ -146,7 +146,7 @@ impl Sheet {
 
     /// Barycentric coordinates in triangle `t` of a point of face `f`. They are −∞ where the triangle has no
     /// area.
-    pub fn shares(&self, base: &Base, f: u32, t: u32, w: &[f64; 3]) -> [f64; 3] {
+    pub(super) fn shares(&self, base: &Base, f: u32, t: u32, w: &[f64; 3]) -> [f64; 3] {
         let [p, q, r] = self.corners[t as usize].map(|p| self.point_on(base, f, p));
         let parts = [Self::area(w, &q, &r), Self::area(&p, w, &r), Self::area(&p, &q, w)];
         let sum: f64 = parts.iter().sum();
@@ -154,7 +154,7 @@ impl Sheet {
     }
 
     /// Rest position of point `p` after a move to `w` on face `f`: the skin as it is there now.
-    pub fn place_at(&self, base: &Base, f: u32, p: u32, w: &[f64; 3]) -> nalgebra::Vector3<f64> {
+    pub(super) fn place_at(&self, base: &Base, f: u32, p: u32, w: &[f64; 3]) -> nalgebra::Vector3<f64> {
         let mut best = (f64::NEG_INFINITY, self.points[p as usize].place);
         for &t in &self.over[f as usize] {
             if !self.corners[t as usize].contains(&p) {
@@ -172,7 +172,7 @@ impl Sheet {
 
     /// Whether the point at corner `h` may move to the target. No triangle may turn over, and no cut may run
     /// through the point.
-    pub fn can_move(&self, base: &Base, h: u32, point: u32, target: &Target) -> bool {
+    pub(super) fn can_move(&self, base: &Base, h: u32, point: u32, target: &Target) -> bool {
         let at = Sheet::vertex(base, target);
         let start = if self.from(h) == point { h } else { h / 3 * 3 + (h + 1) % 3 };
         self.around(start).iter().all(|&g| {
@@ -187,7 +187,7 @@ impl Sheet {
     }
 
     /// The target as a combination of mesh nodes.
-    pub fn vertex(base: &Base, target: &Target) -> FragmentVertex {
+    pub(super) fn vertex(base: &Base, target: &Target) -> FragmentVertex {
         let mut at = FragmentVertex { nodes: [NONE; 4], weights: [0.0; 4] };
         let parts = base.faces[target.f as usize].nodes.into_iter().zip(target.w).filter(|(_, w)| *w != 0.0);
         for (slot, (node, weight)) in parts.enumerate() {
@@ -198,7 +198,7 @@ impl Sheet {
 }
 
 /// A place on a boundary face.
-pub struct Target {
+pub(super) struct Target {
     /// The face.
     pub f: u32,
     /// Barycentric coordinates on the face.

@@ -102,7 +102,7 @@ impl Laid {
 }
 
 /// A skin of the triangles of a surface, and how many of them it has.
-pub fn own_sheet(
+pub(super) fn own_sheet(
     base: &Base,
     nodes: &[Vector3<f64>],
     own: &OwnSurface<'_>,

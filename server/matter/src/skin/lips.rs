@@ -8,11 +8,11 @@ use crate::cut::topology::fragments::NONE;
 use crate::mesh::TET_FACES;
 
 /// A fragment face: the fragment, and the slot of the vertex opposite.
-pub type Face = (u32, u8);
+pub(super) type Face = (u32, u8);
 
 /// The origin of a corner of a surface triangle.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub enum Corner {
+pub(super) enum Corner {
     /// A skin point.
     Skin(u32),
     /// A fragment vertex.
@@ -23,7 +23,7 @@ pub enum Corner {
 
 /// One edge of the cut curve: where a lip meets the boundary of the uncut mesh.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Border {
+pub(super) struct Border {
     /// Fragment below the skin next to the border.
     pub below: u32,
     /// Boundary face below the border.
@@ -36,7 +36,7 @@ pub struct Border {
 
 /// The triangles of one lip face.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Lip {
+pub(super) struct Lip {
     /// Numbers of its surface triangles.
     pub triangles: Vec<u32>,
     /// Per edge where it meets the skin, if it does.
@@ -46,14 +46,14 @@ pub struct Lip {
 }
 
 /// Whether a fragment face is a lip.
-pub fn is_lip(cut: &CutMesh, (t, k): Face) -> bool {
+pub(super) fn is_lip(cut: &CutMesh, (t, k): Face) -> bool {
     let f = &cut.fragments;
     f.neighbour[t as usize][k as usize] == NONE && f.tag[t as usize][k as usize] != 0
 }
 
 impl Lip {
     /// Finds where a lip meets the skin, and inserts the ends of those edges as skin points.
-    pub fn new(base: &Base, cut: &CutMesh, sheet: &mut Sheet, snapping: f64, (t, k): Face) -> Self {
+    pub(super) fn new(base: &Base, cut: &CutMesh, sheet: &mut Sheet, snapping: f64, (t, k): Face) -> Self {
         let f = &cut.fragments;
         let mut lip = Self::default();
         for (edge, border) in lip.borders.iter_mut().enumerate() {
@@ -71,14 +71,14 @@ impl Lip {
     }
 
     /// Cuts the skin along the borders of the lip.
-    pub fn cut(&self, base: &Base, sheet: &mut Sheet, snapping: f64) {
+    pub(super) fn cut(&self, base: &Base, sheet: &mut Sheet, snapping: f64) {
         for border in self.borders.iter().flatten() {
             sheet.cut_along(base, border.face, border.ends[0], border.ends[1], snapping);
         }
     }
 
     /// Finds the skin half-edges along the borders.
-    pub fn find_chains(&mut self, sheet: &Sheet) -> Result<(), Misfit> {
+    pub(super) fn find_chains(&mut self, sheet: &Sheet) -> Result<(), Misfit> {
         for border in self.borders.iter_mut().flatten() {
             let [from, to] = border.ends;
             let path = sheet.cut_between(border.face, from, to).unwrap_or_default();
@@ -92,7 +92,7 @@ impl Lip {
     }
 
     /// Corners around the lip, and the number of parts of each of its edges.
-    pub fn ring(&self, cut: &CutMesh, sheet: &Sheet, (t, k): Face) -> (Vec<Corner>, [usize; 3]) {
+    pub(super) fn ring(&self, cut: &CutMesh, sheet: &Sheet, (t, k): Face) -> (Vec<Corner>, [usize; 3]) {
         let mut ring = Vec::with_capacity(6);
         let mut parts = [1; 3];
         for (edge, border) in self.borders.iter().enumerate() {
@@ -114,7 +114,7 @@ impl Lip {
 
 /// Triangles that fill an outline whose three sides have `parts` parts. Corners are indices into the ring;
 /// `n`, the length of the ring, stands for the middle. Both lips of a cut are filled alike.
-pub fn fill(n: usize, parts: [usize; 3]) -> Vec<[usize; 3]> {
+pub(super) fn fill(n: usize, parts: [usize; 3]) -> Vec<[usize; 3]> {
     if n == 3 {
         return vec![[0, 1, 2]];
     }

@@ -22,7 +22,7 @@ use super::sheet::Sheet;
 const DETOUR: f64 = 4.0;
 
 /// The edges of a surface on the skin.
-pub struct Overlay {
+pub(super) struct Overlay {
     /// Edges of the surface.
     pub edges: Vec<OwnEdge>,
     /// Skin points along each edge, from its first to its second vertex; empty for edges that are left out.
@@ -33,7 +33,7 @@ impl Overlay {
     /// Divides an undivided skin along all edges of a surface. The boundary has its nodes at `nodes` [m].
     ///
     /// Half-edges of the skin along an edge have its number as their `chain`; [`Sheet::forget_chains`] takes it away.
-    pub fn new(base: &Base, nodes: &[Vector3<f64>], own: &OwnSurface<'_>, sheet: &mut Sheet) -> Self {
+    pub(super) fn new(base: &Base, nodes: &[Vector3<f64>], own: &OwnSurface<'_>, sheet: &mut Sheet) -> Self {
         let map = Map { base, nodes, across: base.across() };
         let mut pen = Pen::new(base, sheet);
         let landed = land(&map, &mut pen, own.landings);

@@ -31,7 +31,7 @@ struct Patch {
 }
 
 /// Lets the skin rest on the surface, and its other points where `shape` says. Returns how much of the surface it took.
-pub fn rest_on(
+pub(super) fn rest_on(
     own: &OwnSurface<'_>,
     overlay: &Overlay,
     nodes: &[Vector3<f64>],

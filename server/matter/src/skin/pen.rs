@@ -20,7 +20,7 @@ const LONGEST: usize = 16;
 
 /// A part of a path over one boundary face, between two points that an edge of the skin joins.
 #[derive(Clone, Copy)]
-pub struct Part {
+pub(super) struct Part {
     /// The face.
     pub face: u32,
     /// The points.
@@ -28,7 +28,7 @@ pub struct Part {
 }
 
 /// Draws on a skin.
-pub struct Pen<'a> {
+pub(super) struct Pen<'a> {
     /// The boundary.
     pub base: &'a Base,
     /// The skin.
@@ -43,7 +43,7 @@ pub struct Pen<'a> {
 
 impl<'a> Pen<'a> {
     /// Begins to draw on a skin that is not divided yet.
-    pub fn new(base: &'a Base, sheet: &'a mut Sheet) -> Self {
+    pub(super) fn new(base: &'a Base, sheet: &'a mut Sheet) -> Self {
         let on_side = vec![Vec::new(); base.n_edges];
         let mut pen = Self { base, sheet, leaving: Vec::new(), on_side, used: Vec::new() };
         (0..pen.sheet.corners.len() as u32).for_each(|t| pen.renew(t));
@@ -51,7 +51,7 @@ impl<'a> Pen<'a> {
     }
 
     /// Makes a point at a place of the boundary, which paths may end at and not pass. None if there is one already.
-    pub fn point(&mut self, target: &Target) -> Option<u32> {
+    pub(super) fn point(&mut self, target: &Target) -> Option<u32> {
         let at = Sheet::vertex(self.base, target);
         let before = [self.sheet.points.len(), self.sheet.corners.len()];
         let point = self.sheet.insert_point(self.base, target.f, &at, 0.0);
@@ -73,7 +73,7 @@ impl<'a> Pen<'a> {
     }
 
     /// The point on side `k` of face `f` at this share from its start.
-    pub fn point_on_side(&mut self, f: u32, k: usize, share: f64) -> u32 {
+    pub(super) fn point_on_side(&mut self, f: u32, k: usize, share: f64) -> u32 {
         let face = self.base.faces[f as usize];
         let [first, second] = [k, (k + 1) % 3].map(|k| self.sheet.corner_point[face.corners[k] as usize]);
         let (start, end, along) =
@@ -99,7 +99,7 @@ impl<'a> Pen<'a> {
 
     /// Joins two points over face `f` by straight edges of the skin and appends them to `parts`. Returns false if a path
     /// bars the way.
-    pub fn join(&mut self, f: u32, from: u32, to: u32, parts: &mut Vec<Part>) -> bool {
+    pub(super) fn join(&mut self, f: u32, from: u32, to: u32, parts: &mut Vec<Part>) -> bool {
         let mut at = from;
         while at != to {
             let Some((end, crossed)) = self.ahead(f, at, to) else { return false };
@@ -186,7 +186,7 @@ impl<'a> Pen<'a> {
 
     /// Joins two points by the shortest way through triangles that crosses no path, and returns its parts. None if there is
     /// none nearby. [`Pen::point_on_side`] does not know the points that it makes.
-    pub fn lead(&mut self, from: u32, to: u32) -> Option<Vec<Part>> {
+    pub(super) fn lead(&mut self, from: u32, to: u32) -> Option<Vec<Part>> {
         let crossed = self.between(from, to)?;
         let mut parts = Vec::with_capacity(crossed.len() + 1);
         let mut last = from;
@@ -234,7 +234,7 @@ impl<'a> Pen<'a> {
     }
 
     /// Whether a path passes no point of another path, nor one of its own points twice, and runs along no other.
-    pub fn is_free(&self, parts: &[Part]) -> bool {
+    pub(super) fn is_free(&self, parts: &[Part]) -> bool {
         let mut inner: Vec<u32> = parts[1..].iter().map(|part| part.ends[0]).collect();
         let apart = inner.iter().all(|&point| !self.used[point as usize]);
         inner.sort_unstable();
@@ -246,7 +246,7 @@ impl<'a> Pen<'a> {
     }
 
     /// Marks a path as chain `number` of the skin.
-    pub fn mark(&mut self, number: u32, parts: &[Part]) {
+    pub(super) fn mark(&mut self, number: u32, parts: &[Part]) {
         for part in parts {
             let Some(h) = self.half_edge(part.face, part.ends[0], part.ends[1]) else { continue };
             self.sheet.chain[h as usize] = number;

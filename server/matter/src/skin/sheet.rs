@@ -13,7 +13,7 @@ pub type SkinShape<'a> = dyn FnMut(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>
 
 /// A vertex of the skin.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Point {
+pub(super) struct Point {
     /// Where it lies on the boundary of the uncut mesh.
     pub at: FragmentVertex,
     /// Rest position [m].
@@ -23,11 +23,11 @@ pub struct Point {
 }
 
 /// Key of a place on the boundary: edge or face, and the bits of the coordinates there.
-pub type Claim = (u32, [u64; 3]);
+pub(super) type Claim = (u32, [u64; 3]);
 
 /// A closed triangulation; half-edge 3·t + k runs from corner k to the next of triangle t.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Sheet {
+pub(super) struct Sheet {
     /// The points.
     pub points: Vec<Point>,
     /// Points of each triangle, counter-clockwise seen from outside.
@@ -55,7 +55,7 @@ pub struct Sheet {
 impl Sheet {
     /// Divides every boundary face into `n`² triangles. A point at `flat` [m] on the boundary rests at
     /// `shape(flat, normal)`.
-    pub fn new(base: &Base, nodes: &[Vector3<f64>], n: usize, shape: &mut SkinShape<'_>) -> Self {
+    pub(super) fn new(base: &Base, nodes: &[Vector3<f64>], n: usize, shape: &mut SkinShape<'_>) -> Self {
         let mut sheet = Self {
             corner_point: vec![NONE; base.n_corners],
             over: vec![Vec::new(); base.faces.len()],
@@ -169,7 +169,7 @@ impl Sheet {
     }
 
     /// Area-weighted unit normals of the flat sheet.
-    pub fn normals(&self, nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    pub(super) fn normals(&self, nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let mut normals = vec![Vector3::zeros(); self.points.len()];
         for corners in &self.corners {
             let [p, q, r] = corners.map(|p| flat(&self.points[p as usize].at, nodes));
@@ -180,7 +180,7 @@ impl Sheet {
     }
 
     /// Appends a triangle without neighbours and returns its number.
-    pub fn push(&mut self, corners: [u32; 3], face: u32) -> u32 {
+    pub(super) fn push(&mut self, corners: [u32; 3], face: u32) -> u32 {
         let t = self.corners.len() as u32;
         self.corners.push(corners);
         self.face.push(face);
@@ -192,45 +192,45 @@ impl Sheet {
     }
 
     /// First point of half-edge `h`.
-    pub fn from(&self, h: u32) -> u32 {
+    pub(super) fn from(&self, h: u32) -> u32 {
         self.corners[h as usize / 3][h as usize % 3]
     }
 
     /// Last point of half-edge `h`.
-    pub fn to(&self, h: u32) -> u32 {
+    pub(super) fn to(&self, h: u32) -> u32 {
         self.corners[h as usize / 3][(h as usize + 1) % 3]
     }
 
     /// Makes two half-edges each other's opposite.
-    pub fn link(&mut self, g: u32, h: u32) {
+    pub(super) fn link(&mut self, g: u32, h: u32) {
         self.twin[g as usize] = h;
         self.twin[h as usize] = g;
     }
 
     /// The half-edge from `p` to `q` over face `f`, if there is one.
-    pub fn half_edge(&self, f: u32, p: u32, q: u32) -> Option<u32> {
+    pub(super) fn half_edge(&self, f: u32, p: u32, q: u32) -> Option<u32> {
         let half_edges = self.over[f as usize].iter().flat_map(|&t| (0..3).map(move |k| 3 * t + k));
         half_edges.into_iter().find(|&h| self.from(h) == p && self.to(h) == q)
     }
 
     /// Barycentric coordinates on face `f` of a point of the boundary.
-    pub fn coordinates(base: &Base, f: u32, at: &FragmentVertex) -> [f64; 3] {
+    pub(super) fn coordinates(base: &Base, f: u32, at: &FragmentVertex) -> [f64; 3] {
         base.faces[f as usize].nodes.map(|node| at.weight_of(node))
     }
 
     /// Barycentric coordinates of skin point `p` on face `f`.
-    pub fn point_on(&self, base: &Base, f: u32, p: u32) -> [f64; 3] {
+    pub(super) fn point_on(&self, base: &Base, f: u32, p: u32) -> [f64; 3] {
         Self::coordinates(base, f, &self.points[p as usize].at)
     }
 
     /// Twice the signed area of a triangle on a face, relative to that of the face. The sign is exact.
-    pub fn area(p: &[f64; 3], q: &[f64; 3], r: &[f64; 3]) -> f64 {
+    pub(super) fn area(p: &[f64; 3], q: &[f64; 3], r: &[f64; 3]) -> f64 {
         let c = |v: &[f64; 3]| Coord3D { x: v[0], y: v[1], z: v[2] };
         robust::orient3d(c(p), c(q), c(r), Coord3D { x: 0.0, y: 0.0, z: 0.0 })
     }
 
     /// Splits the edge of half-edge `h` at point `w`, in both triangles beside it.
-    pub fn split_edge(&mut self, h: u32, w: u32) {
+    pub(super) fn split_edge(&mut self, h: u32, w: u32) {
         let (p, q, g, chain) = (self.from(h), self.to(h), self.twin[h as usize], self.chain[h as usize]);
         let (near, far) = (self.halve(h, w), self.halve(g, w));
         self.link(h, far);
@@ -262,7 +262,7 @@ impl Sheet {
     }
 
     /// Splits triangle `t` into three around point `w`.
-    pub fn split_triangle(&mut self, t: u32, w: u32) {
+    pub(super) fn split_triangle(&mut self, t: u32, w: u32) {
         let [p, q, r] = self.corners[t as usize];
         let f = self.face[t as usize];
         let (second, third) = (self.push([q, r, w], f), self.push([r, p, w], f));
@@ -279,7 +279,7 @@ impl Sheet {
 
     /// Turns the edge of half-edge `h`, so that it joins the other two corners of its triangles. They keep their numbers;
     /// the edge becomes the last half-edge of each.
-    pub fn flip(&mut self, h: u32) {
+    pub(super) fn flip(&mut self, h: u32) {
         let g = self.twin[h as usize];
         let (t, s) = (h / 3, g / 3);
         let (u, v) = (self.from(h), self.to(h));
@@ -301,24 +301,24 @@ impl Sheet {
     }
 
     /// All half-edges that leave the first point of `h`.
-    pub fn around(&self, h: u32) -> Vec<u32> {
+    pub(super) fn around(&self, h: u32) -> Vec<u32> {
         self.fan(h).take(self.corners.len() + 1).collect()
     }
 
     /// The same, one after the other.
-    pub fn fan(&self, h: u32) -> impl Iterator<Item = u32> {
+    pub(super) fn fan(&self, h: u32) -> impl Iterator<Item = u32> {
         let next = move |&g: &u32| Some(self.twin[previous(g) as usize]).filter(|g| *g != h);
         std::iter::successors(Some(h), next)
     }
 
     /// Where point `p` lies on the boundary itself [m], without the shape of the skin.
-    pub fn flat(&self, p: u32, nodes: &[Vector3<f64>]) -> Vector3<f64> {
+    pub(super) fn flat(&self, p: u32, nodes: &[Vector3<f64>]) -> Vector3<f64> {
         flat(&self.points[p as usize].at, nodes)
     }
 
     /// Forgets all chains and what points represent, except at corners of the boundary: an uncut skin that is divided
     /// in any way.
-    pub fn forget_chains(&mut self) {
+    pub(super) fn forget_chains(&mut self) {
         self.chain.fill(NONE);
         self.chains.clear();
         self.claims.clear();
@@ -330,19 +330,19 @@ impl Sheet {
     }
 
     /// Adds a point and returns its number.
-    pub fn add_point(&mut self, at: FragmentVertex, place: Vector3<f64>, claimed: bool) -> u32 {
+    pub(super) fn add_point(&mut self, at: FragmentVertex, place: Vector3<f64>, claimed: bool) -> u32 {
         self.points.push(Point { at, place, claimed });
         self.points.len() as u32 - 1
     }
 }
 
 /// The next half-edge around the same triangle.
-pub fn following(h: u32) -> u32 {
+pub(super) fn following(h: u32) -> u32 {
     h / 3 * 3 + (h + 1) % 3
 }
 
 /// The previous half-edge around the same triangle.
-pub fn previous(h: u32) -> u32 {
+pub(super) fn previous(h: u32) -> u32 {
     h / 3 * 3 + (h + 2) % 3
 }
 

@@ -19,7 +19,7 @@ use crate::cut::{CutMesh, Surface};
 use crate::element::MaterialPoint;
 
 /// The state from which the surface is built.
-pub struct SkinSource<'a> {
+pub(super) struct SkinSource<'a> {
     /// The body.
     pub cut: &'a CutMesh,
     /// Boundary of the uncut body.
@@ -32,7 +32,7 @@ pub struct SkinSource<'a> {
 
 /// Fragments and pieces that the last cut changed.
 #[derive(Clone, Copy, Debug)]
-pub struct Change<'a> {
+pub(super) struct Change<'a> {
     /// Fragments that are new, were bisected or had a face opened.
     pub fragments: &'a [u32],
     /// Pieces that were split, created or given other copies.
@@ -48,7 +48,7 @@ enum Owner {
 
 /// The joined surface: its connectivity, and the origin of its triangles.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct SkinJoin {
+pub(super) struct SkinJoin {
     joined: Joined,
     parts: Parts,
     /// Numbers of surface triangles that are no longer in use.
@@ -78,23 +78,23 @@ impl Parts {
 
 impl SkinJoin {
     /// Number of skin triangles that the last change renewed.
-    pub fn renewed(&self) -> usize {
+    pub(super) fn renewed(&self) -> usize {
         self.renewed
     }
 
     /// Numbers of triangles, vertices and doubled edges.
     #[cfg(test)]
-    pub fn sizes(&self) -> [usize; 3] {
+    pub(super) fn sizes(&self) -> [usize; 3] {
         self.joined.sizes()
     }
 
     /// Surface triangle of skin triangle `t`.
-    pub fn of_skin(&self, t: u32) -> u32 {
+    pub(super) fn of_skin(&self, t: u32) -> u32 {
         self.parts.of_skin[t as usize]
     }
 
     /// Updates `surface`. After an error it is not usable.
-    pub fn sew(
+    pub(super) fn sew(
         &mut self,
         source: &mut SkinSource,
         change: Change,

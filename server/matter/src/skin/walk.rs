@@ -20,7 +20,7 @@ enum Step {
 
 impl Sheet {
     /// Points along the cut between two points over face `f`, if that cut was inserted.
-    pub fn cut_between(&self, f: u32, from: u32, to: u32) -> Option<Vec<u32>> {
+    pub(super) fn cut_between(&self, f: u32, from: u32, to: u32) -> Option<Vec<u32>> {
         for &t in &self.over[f as usize] {
             for k in 0..3 {
                 let h = 3 * t + k;
@@ -43,7 +43,7 @@ impl Sheet {
     }
 
     /// Cuts the skin over face `f` along the line between two points.
-    pub fn cut_along(&mut self, base: &Base, f: u32, from: u32, to: u32, snapping: f64) {
+    pub(super) fn cut_along(&mut self, base: &Base, f: u32, from: u32, to: u32, snapping: f64) {
         if self.cut_between(f, from, to).is_some() {
             return;
         }

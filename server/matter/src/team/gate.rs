@@ -40,7 +40,7 @@ unsafe impl Send for Gate {}
 
 impl Gate {
     /// A closed gate for as many members.
-    pub fn new(members: usize) -> Self {
+    pub(super) fn new(members: usize) -> Self {
         Self {
             job: UnsafeCell::new(None),
             word: AtomicU64::new(CLOSED),
@@ -50,7 +50,7 @@ impl Gate {
     }
 
     /// Divides the tasks 0 … `n` − 1 among the members. Only while the gate is closed and empty.
-    pub fn share_out(&self, n: usize) {
+    pub(super) fn share_out(&self, n: usize) {
         for (member, next) in self.next.iter().enumerate() {
             next.0.store(self.first(member, n), Ordering::Relaxed);
         }
@@ -58,7 +58,7 @@ impl Gate {
 
     /// Runs tasks of `n` as `member`: those of its own range first, then what the others have left. No number
     /// is given twice.
-    pub fn work(&self, member: usize, n: usize, mut task: impl FnMut(usize)) {
+    pub(super) fn work(&self, member: usize, n: usize, mut task: impl FnMut(usize)) {
         for helped in (member..self.next.len()).chain(0..member) {
             loop {
                 let t = self.next[helped].0.fetch_add(1, Ordering::Relaxed);
@@ -80,7 +80,7 @@ impl Gate {
     /// # Safety
     /// The caller is the only owner. It has to keep `job` alive until it has called [`close`](Self::close) and
     /// seen that [`is_left`](Self::is_left), before it opens the gate again too.
-    pub unsafe fn open(&self, job: &(dyn Fn(usize) + Sync)) {
+    pub(super) unsafe fn open(&self, job: &(dyn Fn(usize) + Sync)) {
         // SAFETY: the gate is closed and nobody is inside, so nobody reads the cell; the caller keeps the
         // closure alive as long as somebody may be inside.
         unsafe {
@@ -91,23 +91,23 @@ impl Gate {
     }
 
     /// Lets nobody in any more.
-    pub fn close(&self) {
+    pub(super) fn close(&self) {
         self.word.fetch_or(CLOSED, Ordering::Relaxed);
     }
 
     /// Whether nobody is inside; what those who left have written is visible then.
-    pub fn is_left(&self) -> bool {
+    pub(super) fn is_left(&self) -> bool {
         self.word.load(Ordering::Acquire) & INSIDE == 0
     }
 
     /// Whether a member panicked since the last call.
-    pub fn take_panic(&self) -> bool {
+    pub(super) fn take_panic(&self) -> bool {
         self.panicked.swap(false, Ordering::Relaxed)
     }
 
     /// Works on the present phase as `member` if it is open and is not `done`, which becomes its number.
     /// Returns whether it did.
-    pub fn help(&self, member: usize, done: &mut u64) -> bool {
+    pub(super) fn help(&self, member: usize, done: &mut u64) -> bool {
         let Some(phase) = self.enter(*done) else { return false };
         *done = phase;
         // SAFETY: this member is inside, so the owner keeps the job alive; it is Sync.

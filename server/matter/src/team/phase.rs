@@ -60,12 +60,12 @@ pub(crate) struct Marks(Option<PhaseMark>);
 
 impl Marks {
     /// Calls `mark` from now on, or nobody.
-    pub fn set(&mut self, mark: Option<PhaseMark>) {
+    pub(crate) fn set(&mut self, mark: Option<PhaseMark>) {
         self.0 = mark;
     }
 
     /// Announces that `phase` begins.
-    pub fn begin(&mut self, phase: Phase) {
+    pub(crate) fn begin(&mut self, phase: Phase) {
         if let Some(mark) = &mut self.0 {
             mark(phase);
         }

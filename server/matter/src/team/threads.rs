@@ -35,7 +35,7 @@ pub(super) struct Lookout {
 impl Threads {
     /// Threads for `members` members, the caller included, and a gate for a leading team and for each of the
     /// `sizes`. Members are at home where their share of the sizes is.
-    pub fn new(members: usize, sizes: &[usize]) -> std::io::Result<Self> {
+    pub(super) fn new(members: usize, sizes: &[usize]) -> std::io::Result<Self> {
         let members = members.max(1);
         let mut threads = Self::room(members, sizes);
         for member in 1..members {
@@ -47,7 +47,7 @@ impl Threads {
     }
 
     /// No thread but the caller's.
-    pub fn alone() -> Self {
+    pub(super) fn alone() -> Self {
         Self::room(1, &[])
     }
 
@@ -61,26 +61,26 @@ impl Threads {
     }
 
     /// Number of members, the caller included.
-    pub fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.members.len() + 1
     }
 
-    pub fn gate(&self, number: usize) -> &Gate {
+    pub(super) fn gate(&self, number: usize) -> &Gate {
         &self.shared.gates[number]
     }
 
     /// Wakes the members that sleep.
-    pub fn wake(&self) {
+    pub(super) fn wake(&self) {
         self.members.iter().for_each(|member| member.thread().unpark());
     }
 
     /// A lookout for the caller, which helps as the last member: the first leads.
-    pub fn lookout(&self) -> Lookout {
+    pub(super) fn lookout(&self) -> Lookout {
         self.shared.lookout(self.members.len())
     }
 
     /// Helps one of the teams that work side by side, if one of them is in a phase.
-    pub fn help(&self, lookout: &mut Lookout) -> bool {
+    pub(super) fn help(&self, lookout: &mut Lookout) -> bool {
         self.shared.help(lookout)
     }
 }

@@ -17,7 +17,7 @@ use super::part::{Kind, Part};
 use super::verdict::{Verdict, judge, reason};
 
 /// File of the page of a paper.
-pub fn name(paper: &Paper) -> String {
+pub(super) fn name(paper: &Paper) -> String {
     format!("paper-{}.html", paper.id)
 }
 
@@ -60,7 +60,7 @@ fn plain(value: &Value) -> String {
 }
 
 /// The page of a paper: a row per printed number.
-pub fn paper(paper: &Paper, measured: &Measured, origin: &Origin, quick: bool) -> String {
+pub(super) fn paper(paper: &Paper, measured: &Measured, origin: &Origin, quick: bool) -> String {
     let mut out = format!(
         "<p><a href=\"index.html\">The book</a></p>\n<header><h1>{}</h1>\n<p class=\"lead\">{}, {}</p></header>\n\
          <p>{}</p>\n<p class=\"note\">Printed: {}. Here: {}.",
@@ -138,7 +138,7 @@ fn row(paper: &Paper, number: &Number, measured: &Measured, quick: bool) -> Stri
 }
 
 /// The index: papers with their tallies, and the parts with their pages.
-pub fn index(
+pub(super) fn index(
     papers: &[Paper],
     tallies: &[Tally],
     parts: &[Part],
@@ -273,7 +273,7 @@ fn haptics(measured: &Measured) -> String {
 }
 
 /// What the effects of the scenes cost.
-pub fn effects(measured: &Measured) -> String {
+pub(super) fn effects(measured: &Measured) -> String {
     let mut out = "<p><a href=\"index.html\">The book</a></p>\n<header><h1>What effects cost</h1>\n<p class=\"lead\">Processor \
                    time of a step with an effect and without it, on one thread.</p></header>\n"
         .to_owned();

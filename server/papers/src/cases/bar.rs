@@ -19,7 +19,7 @@ fn gold() -> Gold {
 }
 
 /// The bar at rest, against stored solutions.
-pub fn at_rest(quick: bool) -> Case {
+pub(super) fn at_rest(quick: bool) -> Case {
     let body = ["bar".to_owned()];
     let gold = gold();
     let all = [[10, 2, 2], [20, 4, 4], [30, 6, 6], [40, 8, 8]];
@@ -65,7 +65,7 @@ pub fn at_rest(quick: bool) -> Case {
 }
 
 /// The bar released from its straight shape: five seconds of motion.
-pub fn in_motion(quick: bool) -> Case {
+pub(super) fn in_motion(quick: bool) -> Case {
     let body = ["bar".to_owned()];
     let gold = gold();
     let all = [[10, 2, 2], [20, 4, 4], [30, 6, 6], [40, 8, 8]];

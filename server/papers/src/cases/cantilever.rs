@@ -14,7 +14,7 @@ use super::shared::{axes, labels, load, names};
 const BEAM: Beam = Beam { l: 1.2, h: 0.2, d: 0.3, young: 1e6, force: 3.0 };
 
 /// Builds the case.
-pub fn case(quick: bool) -> Case {
+pub(super) fn case(quick: bool) -> Case {
     let body = ["beam".to_owned()];
     let mut probes = Vec::new();
     let mut truth = Vec::new();

@@ -11,7 +11,7 @@ use super::gold::Gold;
 use super::shared::{axes, labels, load, names};
 
 /// Builds the case.
-pub fn case(quick: bool) -> Case {
+pub(super) fn case(quick: bool) -> Case {
     let body = ["beam".to_owned()];
     let gold = Gold::read(include_str!("../../cases/r2-tc1.gold.json"));
     // The mesh 5×10×33 has faces beside the cut. The others have a layer of faces in the cut.

@@ -63,6 +63,6 @@ impl Gold {
 }
 
 /// The override `probe=[…]` for points of a body.
-pub fn probes_override(body: &str, points: &[Point]) -> String {
+pub(super) fn probes_override(body: &str, points: &[Point]) -> String {
     format!("probe=[{}]", probe_tables(body, points))
 }

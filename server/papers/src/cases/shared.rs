@@ -5,7 +5,7 @@ use scindo_study::design::axes::{Axis, Factor, precisions, threads, tolerances, 
 use scindo_world::scene::Scene;
 
 /// The axes law, element, mesh, solver, tolerance, precision and threads.
-pub fn axes(bodies: &[String], law: &str, element: Axis, mesh: Axis, tolerance: f64) -> Vec<Axis> {
+pub(super) fn axes(bodies: &[String], law: &str, element: Axis, mesh: Axis, tolerance: f64) -> Vec<Axis> {
     vec![
         words(Factor::Law, bodies, "law", &LAWS, law),
         element,
@@ -18,18 +18,18 @@ pub fn axes(bodies: &[String], law: &str, element: Axis, mesh: Axis, tolerance: 
 }
 
 /// The labels of an axis.
-pub fn labels(axes: &[Axis], factor: Factor) -> Vec<String> {
+pub(super) fn labels(axes: &[Axis], factor: Factor) -> Vec<String> {
     let axis = axes.iter().find(|axis| axis.factor == factor);
     axis.map(|axis| axis.settings.iter().map(|s| s.label.clone()).collect()).unwrap_or_default()
 }
 
 /// Converts literals to labels.
-pub fn names(labels: &[&str]) -> Vec<String> {
+pub(super) fn names(labels: &[&str]) -> Vec<String> {
     labels.iter().map(|label| (*label).to_owned()).collect()
 }
 
 /// Parses a scene that is part of the program. Panics if it is invalid.
-pub fn load(text: &str, overrides: &[String]) -> Scene {
+pub(super) fn load(text: &str, overrides: &[String]) -> Scene {
     let scene = Scene::from_toml(text).and_then(|scene| scene.apply_sets(overrides));
     scene.expect("the file is part of the program and a test reads it")
 }

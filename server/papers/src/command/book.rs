@@ -37,7 +37,7 @@ const HANDS: usize = 2;
 
 /// Runs the parts that are not done yet, and writes the pages after each of them. Ctrl-C ends it; the same command goes
 /// on.
-pub fn book(args: &BookArgs) -> Result<ExitCode, PapersError> {
+pub(super) fn book(args: &BookArgs) -> Result<ExitCode, PapersError> {
     let all = parts(args.quick);
     if args.list {
         all.iter().for_each(|part| say!("{:24} {}", part.name, part.title));

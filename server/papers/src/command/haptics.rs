@@ -19,7 +19,7 @@ use crate::haptics::trial::Trial;
 use crate::haptics::{page, table};
 
 /// Runs the table and writes the page. Ctrl-C ends it after the cells that are under way.
-pub fn haptics(args: &HapticsArgs) -> Result<ExitCode, PapersError> {
+pub(super) fn haptics(args: &HapticsArgs) -> Result<ExitCode, PapersError> {
     let stop = Arc::new(AtomicBool::new(false));
     listen(&stop)?;
     let cells = table::cells(args.quick);

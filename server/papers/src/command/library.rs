@@ -8,7 +8,7 @@ use crate::lab::ExperimentBench;
 use crate::{cases, experiment};
 
 /// All cases and experiments.
-pub struct Named;
+pub(super) struct Named;
 
 impl Library for Named {
     fn cases(&self, name: &str, quick: bool) -> Vec<Case> {

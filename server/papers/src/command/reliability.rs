@@ -22,7 +22,7 @@ use crate::error::PapersError;
 const MUTANT_SEEDS: u64 = 100;
 
 /// Runs the campaign. Ctrl-C ends it after the seeds that are under way.
-pub fn reliability(args: &ReliabilityArgs) -> Result<ExitCode, PapersError> {
+pub(super) fn reliability(args: &ReliabilityArgs) -> Result<ExitCode, PapersError> {
     let stop = Arc::new(AtomicBool::new(false));
     listen(&stop)?;
     let failed = |error: EpisodeError| RuntimeError::System {

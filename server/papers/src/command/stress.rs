@@ -16,7 +16,7 @@ use crate::haptics::cases::CASES;
 use crate::stress::{self, CaseReport, Progress, Row, Settings, Status, SuiteReport};
 
 /// Runs the cases and writes the page. Ctrl-C ends it after the cases that are under way.
-pub fn stress(args: &StressArgs) -> Result<ExitCode, PapersError> {
+pub(super) fn stress(args: &StressArgs) -> Result<ExitCode, PapersError> {
     if args.list {
         return list(args);
     }

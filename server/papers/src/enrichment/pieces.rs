@@ -15,7 +15,7 @@ pub struct Piece {
 }
 
 /// Pieces [L, R] of a bar with nodes at 0 and 1 that is cut at `c`, 0 < c < 1. Node 0 is on side L.
-pub fn bar_pieces(c: f64) -> Result<[Piece; 2], EnrichmentError> {
+pub(super) fn bar_pieces(c: f64) -> Result<[Piece; 2], EnrichmentError> {
     if !(c > 0.0 && c < 1.0) {
         return Err(EnrichmentError::NotCut);
     }
@@ -30,7 +30,7 @@ pub fn bar_pieces(c: f64) -> Result<[Piece; 2], EnrichmentError> {
 
 /// Sides of the nodes, and pieces [L, R], of a tet cut where the linear interpolant of `levels` vanishes.
 /// Side L is where it is negative. No node may lie on the cut, and each side must have a node.
-pub fn tet_pieces(levels: [f64; 4]) -> Result<([Side; 4], [Piece; 2]), EnrichmentError> {
+pub(super) fn tet_pieces(levels: [f64; 4]) -> Result<([Side; 4], [Piece; 2]), EnrichmentError> {
     if levels.iter().any(|&level| level == 0.0 || !level.is_finite()) {
         return Err(EnrichmentError::NotCut);
     }

@@ -12,7 +12,7 @@ const SMALLEST_PIVOT: f64 = 1e-13;
 ///
 /// M is scaled to a unit diagonal, S M S = L Lᵀ with S = diag(M)^−½, so that masses many orders of magnitude
 /// apart do no harm. Then ω² are the eigenvalues of L⁻¹ S K S L⁻ᵀ.
-pub fn largest_frequency(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Result<f64, EnrichmentError> {
+pub(super) fn largest_frequency(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Result<f64, EnrichmentError> {
     let n = M.nrows();
     let mut scale = Vec::with_capacity(n);
     for i in 0..n {

@@ -16,7 +16,7 @@ use crate::lab::{ExperimentBench, Trouble};
 type V = Vector3<f64>;
 
 /// Positions [m] and triangles of a surface.
-pub type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+pub(super) type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
 /// Squares across a face of the cube from which a surface is made: 12 n² triangles.
 const ACROSS: [usize; 3] = [20, 65, 204];
@@ -43,7 +43,7 @@ const WORK: [&str; 8] = [
 ///
 /// # Errors
 /// The user ended the study.
-pub fn collision(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn collision(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "collision",
         title: "Collision detection: what it costs".into(),
@@ -87,7 +87,7 @@ pub fn collision(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Tr
 }
 
 /// Times of all work [s], in the order of [`WORK`].
-pub fn measure(method: Method, mesh: &Mesh) -> Result<[f64; 8], Trouble> {
+pub(super) fn measure(method: Method, mesh: &Mesh) -> Result<[f64; 8], Trouble> {
     let (positions, triangles) = mesh;
     let mut surface = SurfaceBvh::with_method(method, positions, triangles)?;
     let build = least(|| {
@@ -148,7 +148,7 @@ pub fn measure(method: Method, mesh: &Mesh) -> Result<[f64; 8], Trouble> {
 }
 
 /// A closed surface of 12 n² triangles: a sphere with dents, from the six faces of a cube.
-pub fn dented(n: usize) -> Mesh {
+pub(super) fn dented(n: usize) -> Mesh {
     let mut numbers = std::collections::BTreeMap::new();
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     let mut vertex = |at: [usize; 3]| {

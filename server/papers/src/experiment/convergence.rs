@@ -24,7 +24,7 @@ const MASSES: [f64; 3] = [1e5, 1e4, 1e3];
 ///
 /// # Errors
 /// The user ended the study.
-pub fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "dick-convergence",
         title: "Convergence of multigrid on cut cells: figure 10".into(),

@@ -36,7 +36,7 @@ const POISSON: ([f64; 3], u32) = ([0.3, 0.45, 0.49], 32);
 ///
 /// # Errors
 /// The user ended the study.
-pub fn cubes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn cubes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "cells-cube",
         title: "A cube of cells to a millionth".into(),
@@ -108,7 +108,7 @@ fn of_stored(bench: &mut ExperimentBench<'_>) -> Result<Table, Trouble> {
 ///
 /// # Errors
 /// More cells than a lattice may have.
-pub fn clamped(across: u32) -> Result<Model, Trouble> {
+pub(super) fn clamped(across: u32) -> Result<Model, Trouble> {
     let model = model::cube(across, 0, Grid::Uncut)?;
     Ok(Model { held: |X| X.x == 0.0, pull: |_| V::new(0.0, 0.0, -9.81), ..model })
 }
@@ -117,7 +117,7 @@ pub fn clamped(across: u32) -> Result<Model, Trouble> {
 ///
 /// # Errors
 /// The stored solution cannot be read.
-pub fn off(system: &System, across: u32, u: &[V]) -> Result<f64, Trouble> {
+pub(super) fn off(system: &System, across: u32, u: &[V]) -> Result<f64, Trouble> {
     let stored: Value = serde_json::from_str(STORED)?;
     let probes = stored["probes"].as_object().ok_or("no probes in the stored solution")?;
     let largest = stored["max_abs_u"].as_f64().ok_or("no `max_abs_u` in the stored solution")?;

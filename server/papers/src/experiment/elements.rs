@@ -70,7 +70,7 @@ type Run = (usize, Trial);
 ///
 /// # Errors
 /// The user ended the study, or the limit is not known.
-pub fn elements(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn elements(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "cells-elements",
         title: "Tetrahedra and octree cells at equal error".into(),

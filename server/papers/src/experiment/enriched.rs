@@ -48,7 +48,7 @@ const PRINTED: [(Law, [Option<f64>; 2]); 3] = [
 ///
 /// # Errors
 /// A body could not be made, or the user ended the study.
-pub fn enriched(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn enriched(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let cells = CELLS[usize::from(bench.is_quick())];
     let mut result = ExperimentResult {
         name: "enriched",

@@ -68,7 +68,7 @@ type Cut = Option<(Way, f64)>;
 ///
 /// # Errors
 /// The user ended the study.
-pub fn front(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn front(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "front",
         title: "The front of a cut inside elements".into(),

@@ -19,7 +19,7 @@ use crate::system::solve::step_of_three;
 const LAYER: [f64; 2] = [0.475, 0.525];
 /// Height to which the blades reach [m]. The cube without the layer then has 321,698 leaves, the 321 K of the paper,
 /// where the depth is not printed.
-pub const TIP: f64 = 0.2;
+pub(super) const TIP: f64 = 0.2;
 /// Young's moduli of the cube and of the layer [Pa]. A rod of 8 cm on the layer falls over under its own weight below
 /// some 1e5 Pa.
 const YOUNG_PA: [f64; 2] = [5e7, 5e4];
@@ -35,7 +35,7 @@ const SMALL: u32 = 32;
 ///
 /// # Errors
 /// A cut that is refused, or the user ended the study.
-pub fn layer(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn layer(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "dick-layer",
         title: "A soft layer under stiff rods: figure 14".into(),
@@ -98,7 +98,7 @@ pub fn layer(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
 }
 
 /// A body after its steps.
-pub struct Rods {
+pub(super) struct Rods {
     /// The body.
     pub body: Body,
     /// Leaves before and after the cut.
@@ -119,7 +119,7 @@ pub struct Rods {
 ///
 /// # Errors
 /// A cut that is refused.
-pub fn run(across: u32, levels: u8, cut: bool, soft: bool) -> Result<Rods, Trouble> {
+pub(super) fn run(across: u32, levels: u8, cut: bool, soft: bool) -> Result<Rods, Trouble> {
     let region =
         Region { young_pa: YOUNG_PA[1], poisson: MATERIAL.poisson, density_kg_m3: MATERIAL.density_kg_m3 };
     let grid = if cut { Grid::Rotated } else { Grid::Uncut };

@@ -27,7 +27,7 @@ const STEPS: u32 = 15;
 ///
 /// # Errors
 /// A cut that is refused, or the user ended the study.
-pub fn levels(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn levels(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let (across, coarsening) = if bench.is_quick() { QUICK } else { SIZE };
     let mut result = ExperimentResult {
         name: "cells-levels",
@@ -91,7 +91,7 @@ pub fn levels(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troub
 }
 
 /// A body after its steps.
-pub struct Run {
+pub(super) struct Run {
     body: Body,
     /// Unknowns of the simulated level.
     pub unknowns: f64,
@@ -104,7 +104,7 @@ pub struct Run {
 impl Run {
     /// Relative errors against the same body on the finest level: of the mean displacement of the top, and in the
     /// mean square over all vertices.
-    pub fn errors(&self, finest: &Self) -> [f64; 2] {
+    pub(super) fn errors(&self, finest: &Self) -> [f64; 2] {
         let moved = |body: &Body| -> Vec<Vector3<f64>> {
             body.positions().iter().zip(body.rest_positions()).map(|(x, X)| x - X).collect()
         };
@@ -124,7 +124,7 @@ impl Run {
 ///
 /// # Errors
 /// A cut that is refused, or a step that fails.
-pub fn run(across: u32, coarsening: u8, grid: Grid, level: u8) -> Result<Run, Trouble> {
+pub(super) fn run(across: u32, coarsening: u8, grid: Grid, level: u8) -> Result<Run, Trouble> {
     let Model { octree, blades, held, .. } = cube(across, coarsening, grid)?;
     let material = Material { young_pa: YOUNG_PA, law: Law::Corotational, ..MATERIAL };
     let settings = BodySettings {

@@ -65,7 +65,7 @@ force_n = [0.5, 0, 0]
 ///
 /// # Errors
 /// A beam or cube whose solution does not converge, or the user ended the study.
-pub fn nienhuys(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn nienhuys(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "nienhuys",
         title: "Relaxation: table 3.1 and figure 3.12".into(),

@@ -32,7 +32,7 @@ fn models(quick: bool) -> &'static [Entry] {
 }
 
 /// Number of measurements.
-pub fn measurements(quick: bool) -> usize {
+pub(super) fn measurements(quick: bool) -> usize {
     models(quick).len() * STIFFNESS.len()
 }
 
@@ -40,7 +40,7 @@ pub fn measurements(quick: bool) -> usize {
 ///
 /// # Errors
 /// The user ended the study.
-pub fn ratios(
+pub(super) fn ratios(
     bench: &mut ExperimentBench<'_>,
     result: &mut ExperimentResult,
     total: usize,

@@ -113,7 +113,7 @@ const TRIED: [(&str, &[u32]); 2] = [
 ///
 /// # Errors
 /// A scene that cannot be made, a step that does not reach its tolerance, or the user ended the study.
-pub fn peers(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn peers(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "peers",
         title: "Beside other simulators".into(),

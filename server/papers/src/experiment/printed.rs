@@ -3,7 +3,7 @@
 
 /// What the paper prints of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Printed {
+pub(super) struct Printed {
     /// Name in the paper.
     pub name: &'static str,
     /// Hexahedra before the cut: octree and uniform grid; and after the cut.
@@ -20,13 +20,13 @@ pub struct Printed {
 
 impl Printed {
     /// How many times as long conjugate gradients take as multigrid.
-    pub fn ratio(&self) -> f64 {
+    pub(super) fn ratio(&self) -> f64 {
         self.gradients[1] / self.multigrid_s
     }
 }
 
 /// The bunny at 155 cells across.
-pub const BUNNY: Printed = Printed {
+pub(super) const BUNNY: Printed = Printed {
     name: "Bunny",
     cells: [118e3, 755e3, 197e3],
     seconds: [0.693, 2.42, 9.31],
@@ -36,7 +36,7 @@ pub const BUNNY: Printed = Printed {
 };
 
 /// The cube with rotated blades.
-pub const CUBE: Printed = Printed {
+pub(super) const CUBE: Printed = Printed {
     name: "Cube",
     cells: [83.3e3, 512e3, 230e3],
     seconds: [0.781, 3.13, 7.05],
@@ -46,7 +46,7 @@ pub const CUBE: Printed = Printed {
 };
 
 /// The bunny with one octree level less.
-pub const BUNNY_2: Printed = Printed {
+pub(super) const BUNNY_2: Printed = Printed {
     name: "Bunny 2",
     cells: [26.1e3, 94.3e3, 42.4e3],
     seconds: [0.143, 0.498, 1.12],
@@ -56,7 +56,7 @@ pub const BUNNY_2: Printed = Printed {
 };
 
 /// The bunny with two octree levels less.
-pub const BUNNY_3: Printed = Printed {
+pub(super) const BUNNY_3: Printed = Printed {
     name: "Bunny 3",
     cells: [5.48e3, 11.9e3, 8.27e3],
     seconds: [0.0286, 0.0928, 0.130],
@@ -66,7 +66,7 @@ pub const BUNNY_3: Printed = Printed {
 };
 
 /// The armadillo.
-pub const ARMADILLO: Printed = Printed {
+pub(super) const ARMADILLO: Printed = Printed {
     name: "Armadillo",
     cells: [493e3, 3717e3, 643e3],
     seconds: [2.24, 8.24, 47.2],
@@ -77,7 +77,7 @@ pub const ARMADILLO: Printed = Printed {
 
 /// A picture whose caption prints cells, and seconds of cutting and step together.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Picture {
+pub(super) struct Picture {
     /// Its number.
     pub name: &'static str,
     /// Hexahedra before the cut, if printed, and after it.
@@ -87,7 +87,7 @@ pub struct Picture {
 }
 
 /// Figures 11, 13 and 15.
-pub const PICTURES: [Picture; 4] = [
+pub(super) const PICTURES: [Picture; 4] = [
     Picture { name: "figure 11, left", cells: [Some(83e3), Some(204e3)], both_s: 3.5 },
     Picture { name: "figure 13", cells: [Some(345e3), Some(429e3)], both_s: 7.3 },
     Picture { name: "figure 15, middle", cells: [None, Some(166e3)], both_s: 2.6 },
@@ -95,9 +95,9 @@ pub const PICTURES: [Picture; 4] = [
 ];
 
 /// Leaves of the cube with a soft layer: before and after the cut.
-pub const LAYERED: [f64; 2] = [83e3, 321e3];
+pub(super) const LAYERED: [f64; 2] = [83e3, 321e3];
 /// Seconds of cutting and a step of the same.
-pub const LAYERED_S: f64 = 5.5;
+pub(super) const LAYERED_S: f64 = 5.5;
 
 /// Rates of the cycle: uncut, aligned and rotated blades.
-pub const RATES: [f64; 3] = [0.66, 0.75, 0.75];
+pub(super) const RATES: [f64; 3] = [0.66, 0.75, 0.75];

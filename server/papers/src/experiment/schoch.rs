@@ -76,7 +76,7 @@ struct Run {
 ///
 /// # Errors
 /// The user ended the study.
-pub fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "schoch",
         title: "Convergence on a half-cut beam: figure 10 of Schoch".into(),

@@ -19,7 +19,7 @@ const UNIFORM: u32 = 80;
 ///
 /// # Errors
 /// The user ended the study.
-pub fn sizes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn sizes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "dick-sizes",
         title: "Time per cell, and what adaptivity saves".into(),

@@ -26,7 +26,7 @@ const NEARLY_ALL: f64 = 0.99;
 ///
 /// # Errors
 /// A solid without cells, or the user ended the study.
-pub fn skin(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn skin(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "cells-skin",
         title: "The surface of cells beside the solid's own".into(),
@@ -93,7 +93,7 @@ pub fn skin(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble
 }
 
 /// A surface.
-pub struct Triangles {
+pub(super) struct Triangles {
     vertices: Vec<V>,
     triangles: Vec<[u32; 3]>,
     /// Mean normals of the triangles around every vertex, by area.
@@ -104,7 +104,7 @@ pub struct Triangles {
 ///
 /// # Errors
 /// The solid has no cells of this size.
-pub fn filled(solid: &SolidSurface, cells: u32) -> Result<(Triangles, f64), Trouble> {
+pub(super) fn filled(solid: &SolidSurface, cells: u32) -> Result<(Triangles, f64), Trouble> {
     let octree = Octree::fill(solid, OctreeSettings { cells, levels: LEVELS }, &|_| 0)?;
     let built = OctreeSurface::build(&octree);
     let x = octree.rest_positions();
@@ -114,7 +114,7 @@ pub fn filled(solid: &SolidSurface, cells: u32) -> Result<(Triangles, f64), Trou
 }
 
 /// How far two surfaces are apart [m], and their normals [°].
-pub struct Apart {
+pub(super) struct Apart {
     /// Over the vertices of the first.
     pub mean: f64,
     /// Of nearly all vertices of either.
@@ -141,7 +141,7 @@ impl Triangles {
     ///
     /// # Errors
     /// A surface without triangles.
-    pub fn apart(&self, other: &Self) -> Result<Apart, Trouble> {
+    pub(super) fn apart(&self, other: &Self) -> Result<Apart, Trouble> {
         let (there, angles) = self.distances(other)?;
         let (back, _) = other.distances(self)?;
         let mean = there.iter().sum::<f64>() / there.len() as f64;

@@ -55,7 +55,7 @@ struct Fall {
 ///
 /// # Errors
 /// A body could not be made, a step was refused, or the user ended the study.
-pub fn slice(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn slice(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "slice",
         title: "A slice falls and rotates: linear beside nonlinear".into(),

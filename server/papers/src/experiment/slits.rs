@@ -98,7 +98,7 @@ struct Measured {
 ///
 /// # Errors
 /// The user ended the study, or a body could not be made.
-pub fn slits(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn slits(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let [long, wide, high] = [SIZE.x, SIZE.y, SIZE.z].map(|side| 1e3 * side);
     let mut result = ExperimentResult {
         name: "slits",

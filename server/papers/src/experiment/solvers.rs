@@ -24,7 +24,7 @@ const NAMES: [&str; 6] =
 ///
 /// # Errors
 /// The user ended the study.
-pub fn solvers(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn solvers(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "dick-solvers",
         title: "Solvers on cut cells: figure 12".into(),

@@ -57,7 +57,7 @@ struct Answer {
 ///
 /// # Errors
 /// A body could not be made or has no equilibrium, or the user ended the study.
-pub fn springs(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn springs(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "springs",
         title: "Masses and springs beside finite elements".into(),

@@ -21,7 +21,7 @@ const MODELS: [&str; 5] = ["Bunny", "Cube", "Armadillo", "Bunny 2", "Bunny 3"];
 const SMALL: [&str; 2] = ["Bunny 3", "Bunny 2"];
 /// Finest cells across the animals that have as many cells after the cut as the armadillo, and before it as the solid of
 /// figure 13.
-pub const ARMADILLO_ACROSS: u32 = 283;
+pub(super) const ARMADILLO_ACROSS: u32 = 283;
 const SLICED: u32 = 260;
 
 /// Memory of a uniform grid with all that a step needs [bytes per cell].
@@ -41,7 +41,7 @@ struct Entry {
 ///
 /// # Errors
 /// A surface that cannot be read, or the user ended the study.
-pub fn tables(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn tables(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "dick-tables",
         title: "Cutting octree cells: tables 1 and 2".into(),
@@ -182,15 +182,15 @@ fn entry(name: &str, solid: Option<&dyn Shape>, quick: bool) -> Result<Entry, Tr
 }
 
 /// Stiffness numbers with which three cycles reduce the error as printed.
-pub const S_BUNNY: f64 = 34_950.0;
+pub(super) const S_BUNNY: f64 = 34_950.0;
 /// Likewise.
-pub const S_CUBE: f64 = 970.0;
+pub(super) const S_CUBE: f64 = 970.0;
 /// Likewise.
 const S_ARMADILLO: f64 = 15_770.0;
 /// Likewise.
-pub const S_BUNNY_2: f64 = 13_250.0;
+pub(super) const S_BUNNY_2: f64 = 13_250.0;
 /// Likewise.
-pub const S_BUNNY_3: f64 = 4_110.0;
+pub(super) const S_BUNNY_3: f64 = 4_110.0;
 
 /// One step: seconds of the parts, and of three cycles.
 fn measure(entry: &Entry, tables: &mut Tables) -> Result<(), Trouble> {

@@ -100,7 +100,7 @@ pub(super) struct Course {
 ///
 /// # Errors
 /// A scene that cannot be made, or the user ended the study.
-pub fn threads(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn threads(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
     let mut result = ExperimentResult {
         name: "threads",

@@ -8,7 +8,7 @@ use super::mutation::Row;
 use super::suite::SuiteReport;
 
 /// Contents of `stress.json`.
-pub fn suite(report: &SuiteReport, table: Option<&[Row]>) -> Value {
+pub(super) fn suite(report: &SuiteReport, table: Option<&[Row]>) -> Value {
     json!({
         "run": {
             "origin": report.origin,
@@ -26,7 +26,7 @@ pub fn suite(report: &SuiteReport, table: Option<&[Row]>) -> Value {
 }
 
 /// One case; the same on every run.
-pub fn case(report: &CaseReport) -> Value {
+pub(super) fn case(report: &CaseReport) -> Value {
     let case = report.case;
     let charts = report.evidence.charts.iter().map(|chart| {
         let lines = chart.lines.iter().map(|line| json!({ "name": line.name, "points": line.points }));

@@ -27,7 +27,7 @@ h2 .state { vertical-align: 4px; margin-left: 10px; }
 ";
 
 /// The page as one self-contained file.
-pub fn html(report: &SuiteReport, table: Option<&[Row]>) -> String {
+pub(super) fn html(report: &SuiteReport, table: Option<&[Row]>) -> String {
     let mut body = opening(report) + &glance(report);
     body.extend(table.map(mutations));
     body.extend(report.cases.iter().map(section));

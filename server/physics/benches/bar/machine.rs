@@ -8,7 +8,7 @@ use super::peak;
 
 /// Measured limits of this machine for one number of threads.
 #[derive(Clone, Copy, Debug)]
-pub struct Machine {
+pub(crate) struct Machine {
     /// Bandwidth of the triad a = b + s c [byte/s], with all three arrays in the second-level cache, in
     /// the third-level cache, and in memory.
     pub bandwidth: [f64; 3],
@@ -20,18 +20,18 @@ pub struct Machine {
 const WORKING_SETS: [usize; 3] = [384 << 10, 8 << 20, 192 << 20];
 /// Largest working sets [byte] that fit the second-level and the third-level cache.
 const LEVELS: [usize; 2] = [512 << 10, 16 << 20];
-pub const LEVEL_NAMES: [&str; 3] = ["L2", "L3", "DRAM"];
+pub(crate) const LEVEL_NAMES: [&str; 3] = ["L2", "L3", "DRAM"];
 
 impl Machine {
     /// Best of several runs with `threads` threads.
-    pub fn measure(threads: usize, quick: bool) -> Self {
+    pub(crate) fn measure(threads: usize, quick: bool) -> Self {
         let mut team = Team::new(threads).unwrap();
         let bandwidth = WORKING_SETS.map(|bytes| triad(&mut team, bytes, if quick { 3 } else { 25 }));
         Self { bandwidth, flops: peak::multiply_adds(&mut team, if quick { 3 } else { 25 }) }
     }
 
     /// Index into [`LEVEL_NAMES`] of the level that holds `bytes`; each thread has a second-level cache.
-    pub fn level(bytes: usize, threads: usize) -> usize {
+    pub(crate) fn level(bytes: usize, threads: usize) -> usize {
         LEVELS
             .iter()
             .enumerate()
@@ -41,7 +41,7 @@ impl Machine {
 
     /// Least time [s] to stream `bytes` from a working set of `working_set` bytes or to make `flops`
     /// operations, whichever takes longer.
-    pub fn roof(&self, bytes: f64, working_set: usize, flops: f64, threads: usize) -> f64 {
+    pub(crate) fn roof(&self, bytes: f64, working_set: usize, flops: f64, threads: usize) -> f64 {
         (bytes / self.bandwidth[Self::level(working_set, threads)]).max(flops / self.flops)
     }
 }

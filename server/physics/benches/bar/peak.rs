@@ -8,7 +8,7 @@ use scindo_physics::element::Simd;
 use scindo_physics::team::{Team, blocks};
 
 /// Flops per second of independent multiply-adds in registers.
-pub fn multiply_adds(team: &mut Team, runs: usize) -> f64 {
+pub(crate) fn multiply_adds(team: &mut Team, runs: usize) -> f64 {
     const REPEATS: usize = 100_000;
     let mut results = vec![0.0_f32; team.threads()];
     let mut best = f64::INFINITY;

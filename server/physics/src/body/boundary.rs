@@ -26,7 +26,7 @@ pub struct FixedNode {
 
 /// Constraints and loads as requested; cuts do not change them.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Boundary {
+pub(super) struct Boundary {
     /// At most one entry per node, ascending.
     fixed: Vec<FixedNode>,
     /// Force on the material point of a node [N], by node; empty if there is none.
@@ -52,7 +52,7 @@ struct VaryingForce {
 
 impl Boundary {
     /// Collects the constraints and loads stored with nodes.
-    pub fn of_nodes(nodes: &[SnapNode]) -> Self {
+    pub(super) fn of_nodes(nodes: &[SnapNode]) -> Self {
         let forces = |force: fn(&SnapNode) -> Vector3<f64>| -> Vec<Vector3<f64>> {
             let any = nodes.iter().any(|node| force(node) != Vector3::zeros());
             if any { nodes.iter().map(force).collect() } else { Vec::new() }
@@ -70,7 +70,7 @@ impl Boundary {
     }
 
     /// Stores constraint and loads of a node with it.
-    pub fn onto_node(&self, number: u32, node: &mut SnapNode) {
+    pub(super) fn onto_node(&self, number: u32, node: &mut SnapNode) {
         node.fixed = self.fixed_at(number).map(|fixed| (fixed.held, fixed.displacement_m));
         let force = |forces: &[Vector3<f64>]| forces.get(number as usize).copied().unwrap_or_default();
         node.point_force = force(&self.point_force);
@@ -79,7 +79,7 @@ impl Boundary {
 
     /// Applies the requests made between `then` and `now`. `origins` maps their nodes to the `n` nodes of
     /// `self`; requests on nodes without an origin are left out.
-    pub fn take_changes(&mut self, then: &Self, now: &Self, origins: &[u32], n: usize) {
+    pub(super) fn take_changes(&mut self, then: &Self, now: &Self, origins: &[u32], n: usize) {
         let origin = |node: u32| origins.get(node as usize).copied().filter(|&o| o != NEW);
         for old in then.fixed.iter().filter(|f| now.fixed_at(f.node).is_none()) {
             if let Some(node) = origin(old.node) {
@@ -123,7 +123,7 @@ impl Boundary {
     /// Copies without that material stay free: fixing them would glue fragments to air. `rest` are the
     /// rest positions [m] of all copies and of the nodes that the element adds. `share` is the reached
     /// fraction of the prescribed displacements.
-    pub fn fixed_copies(
+    pub(super) fn fixed_copies(
         &self,
         space: &dyn Space,
         rest: &[Vector3<f64>],
@@ -157,7 +157,7 @@ impl Boundary {
 
     /// Holds nodes that refinement put between held ones: in the directions that all of these are held, at the
     /// mean of their displacements.
-    pub fn hold_between(&mut self, new: &[NewCopy], node_of_copy: &[u32]) {
+    pub(super) fn hold_between(&mut self, new: &[NewCopy], node_of_copy: &[u32]) {
         for new in new {
             let Some(between) = &new.between else { continue };
             if let Some((held, displacement_m)) = self.between(between, node_of_copy) {
@@ -181,7 +181,7 @@ impl Boundary {
 
     /// Whether `node`, which lies between others with these `carriers`, has to stay when cells become coarse: it is
     /// loaded, or held in another way than the material between the carriers is.
-    pub fn needs(&self, node: u32, carriers: &MaterialPoint, node_of_copy: &[u32]) -> bool {
+    pub(super) fn needs(&self, node: u32, carriers: &MaterialPoint, node_of_copy: &[u32]) -> bool {
         let varying = self.varying.iter().map(|load| &load.force);
         let loaded = [&self.point_force, &self.spread_force]
             .into_iter()
@@ -204,7 +204,7 @@ impl Boundary {
     }
 
     /// Takes the numbers of the nodes after a coarsening. Nodes that vanish carry no load.
-    pub fn renumber(&mut self, change: &Coarsening) {
+    pub(super) fn renumber(&mut self, change: &Coarsening) {
         self.fixed.retain_mut(|held| {
             held.node = change.vertex_of[held.node as usize];
             held.node != OUTSIDE
@@ -215,14 +215,14 @@ impl Boundary {
     }
 
     /// Forgets the nodes that refinement had added to a body of `n_nodes` nodes.
-    pub fn forget_refinement(&mut self, n_nodes: usize) {
+    pub(super) fn forget_refinement(&mut self, n_nodes: usize) {
         self.fixed.retain(|held| (held.node as usize) < n_nodes);
     }
 
     /// Writes the force [N] on every one of `n` copies and added nodes to `load`. A point force goes to
     /// the copy with the node's material. A spread force goes to all copies of the node, by the volume
     /// they carry. Totals are kept.
-    pub fn node_loads(&mut self, space: &dyn Space, n: usize, load: &mut Vec<Vector3<f64>>) {
+    pub(super) fn node_loads(&mut self, space: &dyn Space, n: usize, load: &mut Vec<Vector3<f64>>) {
         load.clear();
         resize_reserving(load, n, Vector3::zeros());
         self.add_loads(space, load);
@@ -230,7 +230,7 @@ impl Boundary {
 
     /// The same after a cut, with `load` from before it. Point forces stay on their copies, so only
     /// spread forces are shared anew.
-    pub fn loads_of_new_copies(&mut self, space: &dyn Space, load: &mut Vec<Vector3<f64>>) {
+    pub(super) fn loads_of_new_copies(&mut self, space: &dyn Space, load: &mut Vec<Vector3<f64>>) {
         if self.spread_force.is_empty() && self.varying.is_empty() {
             resize_reserving(load, space.n_copies(), Vector3::zeros());
         } else {

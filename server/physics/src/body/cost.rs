@@ -51,7 +51,7 @@ const CYCLES_PER_DECADE: f64 = 1.5;
 
 /// Estimated time [s] of a step of a body of `cells` octree cells on one thread. Cuts that are yet to come add cells, and
 /// iterations.
-pub fn cell_step_seconds(cells: usize, solver: PcgSettings, cycle: Option<CycleShape>) -> f64 {
+pub(super) fn cell_step_seconds(cells: usize, solver: PcgSettings, cycle: Option<CycleShape>) -> f64 {
     let with_cycle = |shape| CELL_CYCLE[usize::from(shape == CycleShape::W)];
     let (step, per_decade, iteration) = match cycle {
         Some(shape) => (CELL_STEP[1], CYCLES_PER_DECADE, with_cycle(shape)),
@@ -61,7 +61,7 @@ pub fn cell_step_seconds(cells: usize, solver: PcgSettings, cycle: Option<CycleS
 }
 
 /// Estimated time [s] of a step of a body of `pieces` pieces on one thread.
-pub fn step_seconds(
+pub(super) fn step_seconds(
     law: Law,
     pieces: usize,
     (solver, method): (PcgSettings, Method),
@@ -82,7 +82,7 @@ pub fn step_seconds(
 }
 
 /// The cheaper of the two ways.
-pub fn cheapest(law: Law, pieces: usize, solver: (PcgSettings, Method)) -> OperatorChoice {
+pub(super) fn cheapest(law: Law, pieces: usize, solver: (PcgSettings, Method)) -> OperatorChoice {
     let [free, assembled] = [false, true].map(|way| step_seconds(law, pieces, solver, way));
     if assembled < free { OperatorChoice::Assembled } else { OperatorChoice::MatrixFree }
 }

@@ -64,14 +64,14 @@ impl Bounds {
 impl Range {
     /// Takes reference sizes from `parts`, from the rest positions [m] of their copies and from what is
     /// prescribed.
-    pub fn follow(&mut self, rest: &[Vector3<f64>], parts: &LooseParts, fixed: &[FixedCopy]) {
+    pub(super) fn follow(&mut self, rest: &[Vector3<f64>], parts: &LooseParts, fixed: &[FixedCopy]) {
         self.measure(rest, parts);
         self.rest.clone_from(&self.boxes);
         self.find_sizes(rest, parts, fixed);
     }
 
     /// The same after a cut that made the copies `new` and left the parts as they were.
-    pub fn follow_new(
+    pub(super) fn follow_new(
         &mut self,
         rest: &[Vector3<f64>],
         new: &[NewCopy],
@@ -109,7 +109,7 @@ impl Range {
 
     /// The part furthest beyond its range after a step from `before` to `after` [m], if it grew in that
     /// step: a body that starts ruined may recover.
-    pub fn beyond(
+    pub(super) fn beyond(
         &mut self,
         before: &[Vector3<f64>],
         after: &[Vector3<f64>],

@@ -73,7 +73,7 @@ struct Start {
 }
 
 impl SnapState {
-    pub fn new(mesh: &TetMesh, how: MeshCut, settings: SnapSettings) -> Self {
+    pub(super) fn new(mesh: &TetMesh, how: MeshCut, settings: SnapSettings) -> Self {
         Self::of(mesh, Snapper::new(how, settings))
     }
 

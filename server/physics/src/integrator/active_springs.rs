@@ -10,7 +10,7 @@ use super::step_inputs::StepInputs;
 const SPRING_ROOM: usize = 64;
 
 /// Makes room in `list` for `each` entries per spring, if there are any springs.
-pub fn make_room<T>(list: &mut Vec<T>, springs: usize, each: usize) {
+pub(super) fn make_room<T>(list: &mut Vec<T>, springs: usize, each: usize) {
     if springs > 0 {
         list.reserve((each * SPRING_ROOM).saturating_sub(list.len()));
     }
@@ -18,7 +18,7 @@ pub fn make_room<T>(list: &mut Vec<T>, springs: usize, each: usize) {
 
 /// The springs of a step that can be used.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct ActiveSprings {
+pub(super) struct ActiveSprings {
     /// Usable springs.
     pub springs: Vec<ActiveSpring>,
     /// Which springs of the inputs these are.
@@ -27,7 +27,7 @@ pub struct ActiveSprings {
 
 impl ActiveSprings {
     /// Takes the springs of `inputs`, whose points are at `x` [m] now.
-    pub fn begin(&mut self, inputs: &StepInputs<'_>, x: &[Vector3<f64>]) {
+    pub(super) fn begin(&mut self, inputs: &StepInputs<'_>, x: &[Vector3<f64>]) {
         self.springs.clear();
         self.accepted.clear();
         make_room(&mut self.springs, inputs.springs.len(), 1);
@@ -40,12 +40,12 @@ impl ActiveSprings {
     }
 
     /// Number of springs that were left out.
-    pub fn refused(&self) -> usize {
+    pub(super) fn refused(&self) -> usize {
         self.accepted.len() - self.springs.len()
     }
 
     /// Writes the force of every spring in the order of the inputs; 0 for those that were left out.
-    pub fn write(&self, forces: &mut [Vector3<f64>], force: impl Fn(&ActiveSpring) -> Vector3<f64>) {
+    pub(super) fn write(&self, forces: &mut [Vector3<f64>], force: impl Fn(&ActiveSpring) -> Vector3<f64>) {
         let mut active = self.springs.iter();
         for (out, &accepted) in forces.iter_mut().zip(&self.accepted) {
             let spring = if accepted { active.next() } else { None };

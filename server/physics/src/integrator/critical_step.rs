@@ -39,7 +39,7 @@ pub(super) struct PowerIteration {
 }
 
 impl PowerIteration {
-    pub fn resize(&mut self, n: usize) {
+    pub(super) fn resize(&mut self, n: usize) {
         for v in [&mut self.q, &mut self.before, &mut self.force, &mut self.acceleration] {
             v.resize(n, Vector3::zeros());
         }
@@ -50,7 +50,7 @@ impl PowerIteration {
 
     /// ω_max [rad/s] of K − ω² M in the directions that are not prescribed, from below: the largest
     /// Ritz value.
-    pub fn omega_max(
+    pub(super) fn omega_max(
         &mut self,
         team: &mut Team,
         K: &BlockCsr<f64>,
@@ -109,7 +109,7 @@ impl PowerIteration {
 
     /// Upper bound of the largest eigenvalue [1/s²] of M⁻¹ Σ k J Jᵀ over all springs, in contact or not,
     /// by the rows of M^−½ (…) M^−½ (Gershgorin).
-    pub fn spring_bound(&mut self, springs: &[ActiveSpring], mass: &[f64]) -> f64 {
+    pub(super) fn spring_bound(&mut self, springs: &[ActiveSpring], mass: &[f64]) -> f64 {
         self.row.fill(0.0);
         for spring in springs {
             let of = |c: usize, w: f64| if mass[c] > 0.0 { w.abs() / mass[c].sqrt() } else { 0.0 };

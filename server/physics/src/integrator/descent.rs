@@ -27,7 +27,7 @@ const FUTILE_SOLVES: u32 = 10;
 
 /// Where a search begins.
 #[derive(Clone, Copy, Debug)]
-pub struct Start<'a> {
+pub(super) struct Start<'a> {
     /// Position of every copy [m].
     pub x: &'a [Vector3<f64>],
     /// Internal force on every copy [N].
@@ -38,7 +38,7 @@ pub struct Start<'a> {
 
 /// What a search needs to remember from solve to solve.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Descent {
+pub(super) struct Descent {
     trial: Vec<Vector3<f64>>,
     /// Largest |Π| met [J].
     largest: f64,
@@ -54,7 +54,7 @@ pub struct Descent {
 
 impl Descent {
     /// Begins an equilibrium.
-    pub fn begin(&mut self) {
+    pub(super) fn begin(&mut self) {
         (self.largest, self.least, self.below_rounding, self.backtracks) =
             (0.0, (f64::INFINITY, 0), false, 0);
         self.memory.clear();
@@ -62,7 +62,7 @@ impl Descent {
 
     /// Takes note of the true residual at the start of a solve. Returns whether more solves are futile: Π resolves
     /// no decrease, and the residual has not halved for some time.
-    pub fn is_futile(&mut self, residual: f64) -> bool {
+    pub(super) fn is_futile(&mut self, residual: f64) -> bool {
         let (least, since) = &mut self.least;
         if residual <= 0.5 * *least {
             (*least, *since) = (residual, 0);
@@ -74,7 +74,7 @@ impl Descent {
 
     /// The largest t ∈ {1, ½, …} for which x + t δ lowers the potential enough; `None` if there is none. Where
     /// the potential cannot resolve the decrease, t is 1 unless the potential rises by more than rounding.
-    pub fn search(
+    pub(super) fn search(
         &mut self,
         inputs: &LinearInputs<'_>,
         springs: &[ActiveSpring],

@@ -15,12 +15,12 @@ pub(crate) const GAIN_CONSERVING: f64 = 0.01;
 pub(crate) const GAIN_DISSIPATING: f64 = 1e-4;
 
 impl Ledger {
-    pub fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.reference = None;
     }
 
     /// Begins a step with energy `H` [J] under its own loads; a jump since the last step is work of these.
-    pub fn begin(&mut self, H: f64) {
+    pub(super) fn begin(&mut self, H: f64) {
         self.reference = Some(match self.reference {
             Some(reference) => reference + H - self.end,
             None => H,
@@ -28,13 +28,13 @@ impl Ledger {
     }
 
     /// Excess of the energy `H` [J] over the reference, if it is more than the `allowed` gain [J].
-    pub fn excess(&self, H: f64, allowed: f64) -> Option<f64> {
+    pub(super) fn excess(&self, H: f64, allowed: f64) -> Option<f64> {
         let excess = H - self.reference.unwrap_or(H);
         (excess.is_nan() || excess > allowed).then_some(excess)
     }
 
     /// Ends the step with energy `H` [J]. If `driven`, prescribed nodes moved and put energy in.
-    pub fn end(&mut self, H: f64, driven: bool) {
+    pub(super) fn end(&mut self, H: f64, driven: bool) {
         self.end = H;
         if driven {
             self.reference = Some(H.max(self.reference.unwrap_or(H)));

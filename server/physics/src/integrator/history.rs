@@ -10,7 +10,7 @@ use super::state::State;
 
 /// The last two states.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct History {
+pub(super) struct History {
     /// State before the last step; `last` is the one that the last step left.
     pub before: State,
     last: State,
@@ -24,18 +24,18 @@ pub struct History {
 
 impl History {
     /// Forgets the last step.
-    pub fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.known = false;
         self.contacts = 0;
     }
 
     /// Whether `state` is what the last step left.
-    pub fn continues(&self, state: &State) -> bool {
+    pub(super) fn continues(&self, state: &State) -> bool {
         self.known && self.last.x == state.x && self.last.v == state.v
     }
 
     /// Treats `copies`, which are held from now on, as if they had always rested at the positions of `state`.
-    pub fn still(&mut self, copies: &[u32], state: &State) {
+    pub(super) fn still(&mut self, copies: &[u32], state: &State) {
         if !self.known {
             return;
         }
@@ -49,7 +49,7 @@ impl History {
 
     /// Why BDF2 cannot make a step of `h` [s]: no history of steps as long, a turn by an angle [rad] that it does
     /// not bear, or more springs in contact at the end of the step than there were.
-    pub fn why_no_bdf2(
+    pub(super) fn why_no_bdf2(
         &self,
         h: f64,
         angle_rad: impl FnOnce() -> f64,
@@ -66,7 +66,7 @@ impl History {
     }
 
     /// Records a step of length `h` [s] from `before` to `after`.
-    pub fn push(&mut self, before: &State, after: &State, h: f64) {
+    pub(super) fn push(&mut self, before: &State, after: &State, h: f64) {
         self.before.copy_motion_from(before);
         self.last.copy_motion_from(after);
         self.h = h;
@@ -74,7 +74,7 @@ impl History {
     }
 
     /// Carries positions and velocities over a coarsening.
-    pub fn coarsen(&mut self, restriction: &Restriction<'_>) {
+    pub(super) fn coarsen(&mut self, restriction: &Restriction<'_>) {
         if self.known {
             for kept in [&mut self.before, &mut self.last] {
                 restriction.sample(&mut kept.x);
@@ -84,7 +84,7 @@ impl History {
     }
 
     /// Gives the copies `new`, which a cut made, the history of their parents.
-    pub fn inherit(&mut self, new: &[NewCopy]) {
+    pub(super) fn inherit(&mut self, new: &[NewCopy]) {
         if !self.known {
             return;
         }

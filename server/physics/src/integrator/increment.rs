@@ -42,7 +42,7 @@ impl Increment {
 
 /// (x_v, x_a) of one copy in BDF2: from positions and velocities now and before.
 #[inline(always)]
-pub fn bdf2_history(
+pub(crate) fn bdf2_history(
     h: f64,
     [x, v]: [&Vector3<f64>; 2],
     [x_before, v_before]: [&Vector3<f64>; 2],
@@ -54,7 +54,7 @@ pub fn bdf2_history(
 
 /// (x_v, x_a) of one copy in Newmark's method: from position, velocity and acceleration now.
 #[inline(always)]
-pub fn newmark_history(
+pub(crate) fn newmark_history(
     h: f64,
     (beta, gamma): (f64, f64),
     [x, v, a]: [&Vector3<f64>; 3],

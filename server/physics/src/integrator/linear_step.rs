@@ -14,7 +14,7 @@
 mod coarse;
 mod equilibrium;
 mod spring_terms;
-pub mod together;
+pub(super) mod together;
 
 use coarse::two_level;
 use nalgebra::{Matrix3, Vector3};

@@ -18,7 +18,7 @@ pub(super) struct Mass {
 }
 
 impl Mass {
-    pub fn new(model: &Model, density_kg_m3: f64, kind: MassKind) -> Self {
+    pub(super) fn new(model: &Model, density_kg_m3: f64, kind: MassKind) -> Self {
         let lumped = model.lumped_mass(density_kg_m3);
         let consistent = (kind == MassKind::Consistent).then(|| {
             let mut M = model.pattern();
@@ -41,7 +41,7 @@ impl Mass {
 
     /// Weight [N] of node `c` under gravity `g` [m/s²]: its row of M g.
     #[inline]
-    pub fn weight(&self, c: usize, g: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn weight(&self, c: usize, g: Vector3<f64>) -> Vector3<f64> {
         match &self.consistent {
             None => self.lumped[c] * g,
             Some((_, integrals)) => integrals[c] * g,
@@ -49,7 +49,7 @@ impl Mass {
     }
 
     /// y += s M x.
-    pub fn add_times(&self, s: f64, x: &[Vector3<f64>], y: &mut [Vector3<f64>]) {
+    pub(super) fn add_times(&self, s: f64, x: &[Vector3<f64>], y: &mut [Vector3<f64>]) {
         for c in 0..y.len() {
             y[c] += s * self.row_times(c, x);
         }
@@ -57,7 +57,7 @@ impl Mass {
 
     /// Row `c` of M x.
     #[inline]
-    pub fn row_times(&self, c: usize, x: &[Vector3<f64>]) -> Vector3<f64> {
+    pub(super) fn row_times(&self, c: usize, x: &[Vector3<f64>]) -> Vector3<f64> {
         match &self.consistent {
             None => self.lumped[c] * x[c],
             Some((M, _)) => {
@@ -72,12 +72,12 @@ impl Mass {
     }
 
     /// ½ vᵀ M v [J].
-    pub fn kinetic(&self, v: &[Vector3<f64>]) -> f64 {
+    pub(super) fn kinetic(&self, v: &[Vector3<f64>]) -> f64 {
         0.5 * (0..v.len()).map(|c| v[c].dot(&self.row_times(c, v))).sum::<f64>()
     }
 
     /// Adds s M to a matrix with the pattern of the model.
-    pub fn add_to(&self, s: f64, A: &mut BlockCsr<f64>) {
+    pub(super) fn add_to(&self, s: f64, A: &mut BlockCsr<f64>) {
         match &self.consistent {
             None => A.add_diagonal(s, &self.lumped),
             Some((M, _)) => A.add_scaled(s, M),
@@ -85,7 +85,7 @@ impl Mass {
     }
 
     /// a = M⁻¹ f; a node without mass does not accelerate. The caller treats held directions.
-    pub fn solve(&mut self, team: &mut Team, f: &[Vector3<f64>], a: &mut [Vector3<f64>]) {
+    pub(super) fn solve(&mut self, team: &mut Team, f: &[Vector3<f64>], a: &mut [Vector3<f64>]) {
         match &self.consistent {
             None => {
                 for ((a, f), &m) in a.iter_mut().zip(f).zip(&self.lumped) {
@@ -99,7 +99,7 @@ impl Mass {
     }
 
     /// Sets the prescribed directions; M⁻¹ then acts on the others.
-    pub fn hold(&mut self, fixed: &[scindo_matter::element::FixedCopy]) {
+    pub(super) fn hold(&mut self, fixed: &[scindo_matter::element::FixedCopy]) {
         if let Some((M, _)) = &self.consistent {
             self.solver.set_matrix(M, fixed);
         }

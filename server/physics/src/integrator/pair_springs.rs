@@ -40,7 +40,7 @@ impl PairSpring {
 
 /// One node that carries a pair spring, with its weight in y.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Carrier {
+pub(super) struct Carrier {
     /// Number of its body in the group.
     pub body: u32,
     /// The node.
@@ -51,7 +51,7 @@ pub struct Carrier {
 
 /// A pair spring in the course of one step.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct ActivePair {
+pub(super) struct ActivePair {
     /// Nodes that carry it, each once.
     pub carriers: SmallVec<[Carrier; 16]>,
     /// Body and node with the largest weight on each side, which tell the parts.
@@ -65,7 +65,7 @@ pub struct ActivePair {
 impl ActivePair {
     /// The spring on a group whose bodies have so many nodes; `None` if a number in it is unusable or a node does
     /// not exist.
-    pub fn usable(spring: &PairSpring, nodes: impl Fn(u32) -> usize) -> Option<Self> {
+    pub(super) fn usable(spring: &PairSpring, nodes: impl Fn(u32) -> usize) -> Option<Self> {
         let law = SpringLaw::new(spring.kind, spring.stiffness_n_m, spring.max_force_n)?;
         let mut carriers: SmallVec<[Carrier; 16]> = SmallVec::new();
         let [a, b] = spring.bodies;
@@ -92,7 +92,7 @@ impl ActivePair {
 
 /// The products of pair springs with vectors, arranged for one linear solve. Springs without stiffness are left out.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct PairTerms {
+pub(super) struct PairTerms {
     terms: Vec<PairTerm>,
     /// Nodes and weights of all terms, one after another.
     carriers: Vec<(u32, f32)>,
@@ -110,7 +110,7 @@ struct PairTerm {
 
 /// A term as a product needs it.
 #[derive(Clone, Copy, Debug)]
-pub struct PairProduct<'a> {
+pub(super) struct PairProduct<'a> {
     stiffness: &'a [Padded; 3],
     sides: [(u32, &'a [(u32, f32)]); 2],
 }
@@ -118,13 +118,13 @@ pub struct PairProduct<'a> {
 impl<'a> PairProduct<'a> {
     /// J: the bodies, with their nodes and weights. A spring within one body has one side.
     #[inline]
-    pub fn sides(&self) -> impl Iterator<Item = (u32, &'a [(u32, f32)])> + use<'a> {
+    pub(super) fn sides(&self) -> impl Iterator<Item = (u32, &'a [(u32, f32)])> + use<'a> {
         self.sides.into_iter().filter(|side| !side.1.is_empty())
     }
 
     /// s k y.
     #[inline]
-    pub fn force(&self, y: &Padded) -> Padded {
+    pub(super) fn force(&self, y: &Padded) -> Padded {
         let [a, b, c] = self.stiffness;
         std::array::from_fn(|i| a[i] * y[0] + b[i] * y[1] + c[i] * y[2])
     }
@@ -132,7 +132,7 @@ impl<'a> PairProduct<'a> {
 
 impl PairTerms {
     /// Takes the springs in their present modes, with the factor `s` of each body's stiffness.
-    pub fn arrange(&mut self, pairs: &[ActivePair], s: impl Fn(u32) -> f64) {
+    pub(super) fn arrange(&mut self, pairs: &[ActivePair], s: impl Fn(u32) -> f64) {
         self.terms.clear();
         self.carriers.clear();
         for pair in pairs {
@@ -152,7 +152,7 @@ impl PairTerms {
     }
 
     /// All terms, in the order of the springs.
-    pub fn iter(&self) -> impl Iterator<Item = PairProduct<'_>> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = PairProduct<'_>> {
         let mut start = 0;
         self.terms.iter().map(move |PairTerm { bodies, ends: [middle, end], stiffness }| {
             let (middle, end) = (*middle as usize, *end as usize);

@@ -106,7 +106,7 @@ fn sum(numbers: &[f64]) -> f64 {
 
 /// The three translation equations S t = b of every part.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Translations {
+pub(super) struct Translations {
     /// Translation of every part so far [m].
     pub shift: Vec<Vector3<f64>>,
     matrix: Vec<Matrix3<f64>>,
@@ -115,13 +115,13 @@ pub struct Translations {
 
 impl Translations {
     /// Starts over for `parts`: no shift.
-    pub fn restart(&mut self, parts: &LooseParts) {
+    pub(super) fn restart(&mut self, parts: &LooseParts) {
         self.shift.clear();
         self.shift.resize(parts.len(), Vector3::zeros());
     }
 
     /// Starts the equations of `parts`: S = factor · mass, b = 0.
-    pub fn begin(&mut self, parts: &LooseParts, mass_factor: f64) {
+    pub(super) fn begin(&mut self, parts: &LooseParts, mass_factor: f64) {
         self.matrix.clear();
         self.matrix.extend(parts.mass.iter().map(|m| Matrix3::from_diagonal_element(m * mass_factor)));
         self.rhs.clear();
@@ -130,23 +130,23 @@ impl Translations {
 
     /// Adds `b` to the right-hand side of the part of `copy`.
     #[inline(always)]
-    pub fn add(&mut self, parts: &LooseParts, copy: usize, b: Vector3<f64>) {
+    pub(super) fn add(&mut self, parts: &LooseParts, copy: usize, b: Vector3<f64>) {
         self.rhs[parts.of_copy[copy] as usize] += b;
     }
 
     /// Adds a spring on the part of `copy`: stiffness to S and force to b.
-    pub fn add_spring(&mut self, parts: &LooseParts, copy: usize, S: Matrix3<f64>, b: Vector3<f64>) {
+    pub(super) fn add_spring(&mut self, parts: &LooseParts, copy: usize, S: Matrix3<f64>, b: Vector3<f64>) {
         self.matrix[parts.of_copy[copy] as usize] += S;
         self.rhs[parts.of_copy[copy] as usize] += b;
     }
 
     /// S and b of a part.
-    pub fn equation(&self, part: usize) -> (&Matrix3<f64>, &Vector3<f64>) {
+    pub(super) fn equation(&self, part: usize) -> (&Matrix3<f64>, &Vector3<f64>) {
         (&self.matrix[part], &self.rhs[part])
     }
 
     /// Solves for every free part and adds the result to `shift`.
-    pub fn solve(&mut self, parts: &LooseParts) {
+    pub(super) fn solve(&mut self, parts: &LooseParts) {
         for part in (0..parts.len()).filter(|&p| parts.free[p]) {
             if let Some(inverse) = self.matrix[part].try_inverse() {
                 self.shift[part] += inverse * self.rhs[part];

@@ -30,7 +30,7 @@ struct Pair {
 
 /// The last pairs.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct QuasiNewton {
+pub(super) struct QuasiNewton {
     pairs: [Pair; PAIRS],
     /// Number of pairs in use; the newest is at `next − 1`, modulo [`PAIRS`].
     known: usize,
@@ -43,18 +43,18 @@ pub struct QuasiNewton {
 
 impl QuasiNewton {
     /// Forgets all pairs.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         (self.known, self.is_waiting) = (0, false);
     }
 
     /// Whether no pair is known.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.known == 0
     }
 
     /// Takes the residual r = −g at the start of a solve, which completes the pair of the last step, and replaces
     /// it by the right-hand side of the solve. Returns whether that is another one.
-    pub fn begin(&mut self, r: &mut [Padded]) -> bool {
+    pub(super) fn begin(&mut self, r: &mut [Padded]) -> bool {
         if self.residual.len() != r.len() {
             self.resize(r.len());
         }
@@ -72,7 +72,7 @@ impl QuasiNewton {
     }
 
     /// Turns the solution δ of the solve into the direction.
-    pub fn end(&self, delta: &mut [Padded]) {
+    pub(super) fn end(&self, delta: &mut [Padded]) {
         for age in (0..self.known).rev() {
             let pair = &self.pairs[(self.next + PAIRS - 1 - age) % PAIRS];
             let beta = pair.rho * dot(&pair.y, delta);
@@ -81,7 +81,7 @@ impl QuasiNewton {
     }
 
     /// Takes the step that was made from the residual of the last [`begin`](Self::begin).
-    pub fn stepped(&mut self, delta: &[Padded]) {
+    pub(super) fn stepped(&mut self, delta: &[Padded]) {
         self.step.copy_from_slice(delta);
         self.is_waiting = true;
     }

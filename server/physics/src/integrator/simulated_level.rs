@@ -33,7 +33,7 @@ const MASS_ITERATIONS: u32 = 60;
 
 /// The simulated level, and what it was brought up to date with.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
-pub struct SimulatedLevel {
+pub(super) struct SimulatedLevel {
     composite: Composite,
     coefficients: Coefficients,
     version: Option<u64>,
@@ -54,7 +54,7 @@ pub struct SimulatedLevel {
 
 impl SimulatedLevel {
     /// Level `level` of `hierarchy`.
-    pub fn new(hierarchy: Hierarchy, level: usize, shape: CycleShape) -> Self {
+    pub(super) fn new(hierarchy: Hierarchy, level: usize, shape: CycleShape) -> Self {
         let n_fine = hierarchy.n_vertices();
         let composite = Composite::new(hierarchy, shape.into(), level);
         let n = composite.n_vertices();
@@ -78,12 +78,12 @@ impl SimulatedLevel {
     }
 
     /// Hierarchy and operators.
-    pub fn multigrid(&self) -> &Multigrid {
+    pub(super) fn multigrid(&self) -> &Multigrid {
         self.composite.multigrid()
     }
 
     /// Follows a cut of `octree`, as [`Multigrid::follow`] does.
-    pub fn follow_cut(
+    pub(super) fn follow_cut(
         &mut self,
         team: &mut Team,
         (octree, changed): (&Octree, &[u32]),
@@ -104,7 +104,7 @@ impl SimulatedLevel {
     }
 
     /// Follows the stiffness as it was last updated.
-    pub fn follow(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
+    pub(super) fn follow(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
         let Self { composite, coefficients, version, .. } = self;
         set_coefficients(coefficients, composite.multigrid().hierarchy(), inputs);
         let (fixed, now) = (inputs.step.fixed, Some(elastic.version()));
@@ -117,13 +117,13 @@ impl SimulatedLevel {
     }
 
     /// Takes the springs of the next solve.
-    pub fn set_springs(&mut self, team: &mut Team, springs: &[Spring]) {
+    pub(super) fn set_springs(&mut self, team: &mut Team, springs: &[Spring]) {
         self.composite.set_springs(team, springs);
     }
 
     /// √(rᵀP M⁻¹ Pᵀr) of a residual of the finest level, 0 in prescribed directions: the norm in which the
     /// reference of a solve is given. After it [`solve`](Self::solve) begins from this residual.
-    pub fn norm(&mut self, team: &mut Team, r: &[Padded]) -> f64 {
+    pub(super) fn norm(&mut self, team: &mut Team, r: &[Padded]) -> f64 {
         self.composite.restrict(team, r, &mut self.b);
         self.precondition(team).max(0.0).sqrt()
     }
@@ -139,7 +139,7 @@ impl SimulatedLevel {
     /// Solves for `delta` += F P x from the residual whose [`norm`](Self::norm) was asked for last. `A` is the
     /// operator of the finest level with the springs that were given last; `exact` tells that those of the level are
     /// Galerkin operators of it up to rounding.
-    pub fn solve(
+    pub(super) fn solve(
         &mut self,
         team: &mut Team,
         (A, exact): (&mut dyn LinearOperator, bool),
@@ -275,7 +275,7 @@ impl SimulatedLevel {
 
     /// Takes vertices between prescribed ones along with these, which the solves cannot move alone: adds to
     /// `predicted` [m] what the level interpolates between its own prescribed vertices.
-    pub fn follow_prescribed(
+    pub(super) fn follow_prescribed(
         &mut self,
         team: &mut Team,
         fixed: &[FixedCopy],
@@ -298,7 +298,12 @@ impl SimulatedLevel {
 
     /// Turns forces [N] into accelerations ā + F P y [m/s²]: ā of the free parts as a whole, 0 for the others, and
     /// PᵀF M F P y = Pᵀ (f − M ā).
-    pub fn accelerate(&mut self, team: &mut Team, forces: &mut [Vector3<f64>], inputs: &LinearInputs<'_>) {
+    pub(super) fn accelerate(
+        &mut self,
+        team: &mut Team,
+        forces: &mut [Vector3<f64>],
+        inputs: &LinearInputs<'_>,
+    ) {
         let StepInputs { fixed, parts, mass, .. } = inputs.step;
         let mut whole = vec![Vector3::zeros(); parts.mass.len()];
         for (f, &part) in forces.iter().zip(&parts.of_copy) {

@@ -141,7 +141,7 @@ impl Slip {
 
 /// Energy, force and stiffness of a spring at one position of its point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SpringResponse {
+pub(super) struct SpringResponse {
     /// Energy [J].
     pub energy: f64,
     /// Force on the body [N].
@@ -159,7 +159,7 @@ const SAME_FRICTION: f64 = 1e-3;
 
 /// The law of a spring in the course of one step: force and stiffness by the position of its point.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
-pub struct SpringLaw {
+pub(super) struct SpringLaw {
     kind: SpringKind,
     /// k [N/m].
     stiffness_n_m: f64,
@@ -175,7 +175,7 @@ pub struct SpringLaw {
 
 impl SpringLaw {
     /// The law of these numbers, with a normal of unit length; `None` if one of them cannot be used.
-    pub fn new(kind: SpringKind, stiffness_n_m: f64, max_force_n: f64) -> Option<Self> {
+    pub(super) fn new(kind: SpringKind, stiffness_n_m: f64, max_force_n: f64) -> Option<Self> {
         let (mut kind, mut grip_n) = (kind, 0.0);
         let usable = match &mut kind {
             SpringKind::OneSided { normal, offset_m } => unit(normal, offset_m),
@@ -204,7 +204,7 @@ impl SpringLaw {
     /// Begins a step with the point at `point`: off without contact, linear otherwise. Friction begins with the
     /// bound that the spring was given: the normal force at a predictor means nothing. What rubbed in the last step
     /// begins in contact, wherever its predictor is: that is farther away than stiff contact is deep.
-    pub fn begin(&mut self, point: Vector3<f64>) {
+    pub(super) fn begin(&mut self, point: Vector3<f64>) {
         self.mode = match self.pull(point) {
             None if self.grip_n <= 0.0 => Mode::Off,
             _ => self.stick_or_slip(point),
@@ -266,7 +266,7 @@ impl SpringLaw {
 
     /// Takes the bound of friction of the [`potential`](Self::potential) from the normal force at `point`.
     /// Returns by how much it changed, relative to its size.
-    pub fn renew_grip(&mut self, point: Vector3<f64>) -> f64 {
+    pub(super) fn renew_grip(&mut self, point: Vector3<f64>) -> f64 {
         let before = self.grip_n;
         self.grip_n = self.bound(point);
         let size = self.grip_n.max(before);
@@ -274,7 +274,7 @@ impl SpringLaw {
     }
 
     /// Force on the body [N] at `point` in the present mode: what the linear solve assumes.
-    pub fn force(&self, point: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn force(&self, point: Vector3<f64>) -> Vector3<f64> {
         let k = self.stiffness_n_m;
         match (self.mode, self.kind) {
             (Mode::Off, _) => Vector3::zeros(),
@@ -295,7 +295,7 @@ impl SpringLaw {
 
     /// Chooses the mode that fits `point`, where a solve has ended; returns whether it changed. The bound of
     /// friction is that of the normal force there.
-    pub fn choose_mode(&mut self, point: Vector3<f64>) -> bool {
+    pub(super) fn choose_mode(&mut self, point: Vector3<f64>) -> bool {
         let before = self.mode;
         self.choices = self.choices.saturating_add(1);
         // A spring that closes was not part of the solve. Its depth says nothing about its force.
@@ -325,12 +325,12 @@ impl SpringLaw {
 
     /// Whether another mode at `point`, where a solve has ended, would change the force by a notable part of the
     /// largest force `scale` [N] of all springs.
-    pub fn would_change(&self, point: Vector3<f64>, scale: f64) -> bool {
+    pub(super) fn would_change(&self, point: Vector3<f64>, scale: f64) -> bool {
         self.notable_change(point, scale) > 0.0
     }
 
     /// By how much another mode would change the force [N]; 0 if that is no notable part of `scale`.
-    pub fn notable_change(&self, point: Vector3<f64>, scale: f64) -> f64 {
+    pub(super) fn notable_change(&self, point: Vector3<f64>, scale: f64) -> f64 {
         let mut next = *self;
         if !next.choose_mode(point) {
             return 0.0;
@@ -340,7 +340,7 @@ impl SpringLaw {
     }
 
     /// k n nᵀ, k I, or k n nᵀ + k_t (I − n nᵀ) [N/m] while the spring is linear, else without its constant part.
-    pub fn stiffness(&self) -> Matrix3<f64> {
+    pub(super) fn stiffness(&self) -> Matrix3<f64> {
         let k = self.stiffness_n_m;
         match (self.mode, self.kind) {
             (Mode::Off | Mode::Capped(_), _) => Matrix3::zeros(),
@@ -364,7 +364,7 @@ impl SpringLaw {
     /// and beyond the cap f_max the line that continues it, f_max s − f_max²/(2k). It is convex, and its
     /// gradient is minus the force on the point [N]. Friction is bounded by the last
     /// [grip](Self::renew_grip).
-    pub fn potential(&self, point: Vector3<f64>) -> SpringResponse {
+    pub(super) fn potential(&self, point: Vector3<f64>) -> SpringResponse {
         let (k, cap) = (self.stiffness_n_m, self.max_force_n);
         let Some(pull) = self.pull(point) else { return SpringResponse::default() };
         let sideways = match self.kind {
@@ -390,12 +390,12 @@ impl SpringLaw {
     }
 
     /// Stiffness k [N/m], whether or not the spring is in contact.
-    pub fn stiffness_n_m(&self) -> f64 {
+    pub(super) fn stiffness_n_m(&self) -> f64 {
         self.stiffness_n_m
     }
 
     /// The directions of the present stiffness, `None` for all three, each with its size [N/m]; all are ≥ 0.
-    pub fn directions(&self) -> impl Iterator<Item = (Option<[f32; 3]>, f64)> + use<> {
+    pub(super) fn directions(&self) -> impl Iterator<Item = (Option<[f32; 3]>, f64)> + use<> {
         let k = self.stiffness_n_m;
         let single = |n: Vector3<f64>| Some([n.x as f32, n.y as f32, n.z as f32]);
         let found = match (self.mode, self.kind) {
@@ -443,14 +443,14 @@ fn is_finite(v: &Vector3<f64>) -> bool {
 
 /// A spring in the course of one step.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
-pub struct ActiveSpring {
+pub(super) struct ActiveSpring {
     point: MaterialPoint,
     law: SpringLaw,
 }
 
 impl ActiveSpring {
     /// Starts a spring at the predicted positions; `None` if it is not [usable](Self::usable).
-    pub fn new(spring: &PointSpring, predicted: &[Vector3<f64>]) -> Option<Self> {
+    pub(super) fn new(spring: &PointSpring, predicted: &[Vector3<f64>]) -> Option<Self> {
         let mut active = Self::usable(spring, predicted.len())?;
         active.law.begin(active.point(predicted));
         Some(active)
@@ -458,7 +458,7 @@ impl ActiveSpring {
 
     /// A spring on a body of `n_copies`; `None` if a number in it is not finite, it has no normal, or a copy
     /// does not exist.
-    pub fn usable(spring: &PointSpring, n_copies: usize) -> Option<Self> {
+    pub(super) fn usable(spring: &PointSpring, n_copies: usize) -> Option<Self> {
         let PointSpring { point, kind, stiffness_n_m, max_force_n } = *spring;
         let exists = point.copies().iter().all(|&c| (c as usize) < n_copies);
         let usable = exists && point.weights().iter().all(|w| w.is_finite());
@@ -467,32 +467,32 @@ impl ActiveSpring {
     }
 
     /// x_p [m].
-    pub fn point(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
+    pub(super) fn point(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
         self.point.position(x)
     }
 
     /// Force, stiffness and mode by the position of the point.
-    pub fn law(&self) -> &SpringLaw {
+    pub(super) fn law(&self) -> &SpringLaw {
         &self.law
     }
 
     /// Keeps the bound of friction of the last step; only for a mutation test.
-    pub fn lag(&mut self) {
+    pub(super) fn lag(&mut self) {
         self.law.lagged = true;
     }
 
     /// See [`SpringLaw::choose_mode`].
-    pub fn choose_mode(&mut self, point: Vector3<f64>) -> bool {
+    pub(super) fn choose_mode(&mut self, point: Vector3<f64>) -> bool {
         self.law.choose_mode(point)
     }
 
     /// See [`SpringLaw::renew_grip`].
-    pub fn renew_grip(&mut self, point: Vector3<f64>) -> f64 {
+    pub(super) fn renew_grip(&mut self, point: Vector3<f64>) -> f64 {
         self.law.renew_grip(point)
     }
 
     /// The spring as terms h² k J Jᵀ of the operator.
-    pub fn terms(&self, h_squared: f64) -> impl Iterator<Item = Spring> + use<> {
+    pub(super) fn terms(&self, h_squared: f64) -> impl Iterator<Item = Spring> + use<> {
         let point = self.point.map(|w| w as f32);
         self.law.directions().map(move |(direction, k)| Spring {
             point,
@@ -502,12 +502,12 @@ impl ActiveSpring {
     }
 
     /// The copy with the largest weight, which tells the part of the point.
-    pub fn main_copy(&self) -> usize {
+    pub(super) fn main_copy(&self) -> usize {
         self.point.main_copy() as usize
     }
 
     /// Copies and weights.
-    pub fn carriers(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(super) fn carriers(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.point.carriers()
     }
 }

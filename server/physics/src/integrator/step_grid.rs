@@ -18,7 +18,7 @@ const STIFFEST: f64 = 1e4;
 
 /// Multigrid, and what it was brought up to date with.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
-pub struct StepGrid {
+pub(super) struct StepGrid {
     multigrid: Multigrid,
     coefficients: Coefficients,
     /// Version of the stiffness at the last update.
@@ -31,7 +31,7 @@ pub struct StepGrid {
 
 impl StepGrid {
     /// Multigrid for the cells of `hierarchy`.
-    pub fn new(hierarchy: Hierarchy, shape: CycleShape) -> Self {
+    pub(super) fn new(hierarchy: Hierarchy, shape: CycleShape) -> Self {
         let none = Coefficients { materials: Vec::new(), scale: 0.0, mass_factor: 0.0 };
         Self {
             multigrid: Multigrid::new(hierarchy, shape.into()),
@@ -43,12 +43,12 @@ impl StepGrid {
     }
 
     /// Hierarchy and operators.
-    pub fn multigrid(&self) -> &Multigrid {
+    pub(super) fn multigrid(&self) -> &Multigrid {
         &self.multigrid
     }
 
     /// Follows a cut of `octree`, as [`Multigrid::follow`] does.
-    pub fn follow_cut(
+    pub(super) fn follow_cut(
         &mut self,
         team: &mut Team,
         cut: (&Octree, &[u32]),
@@ -59,7 +59,7 @@ impl StepGrid {
     }
 
     /// Follows the stiffness as it was last updated.
-    pub fn follow(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
+    pub(super) fn follow(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
         let Self { multigrid, coefficients, version, .. } = self;
         set_coefficients(coefficients, multigrid.hierarchy(), inputs);
         let fixed = inputs.step.fixed;
@@ -74,7 +74,7 @@ impl StepGrid {
 
     /// Decides how cycles take the `springs`, if they can; `diagonal` has the diagonal blocks without them. Returns
     /// whether all levels are to take them, and the eigenvalues are then those of the operator without springs.
-    pub fn sort(&mut self, springs: &[Spring], diagonal: &[Block6]) -> bool {
+    pub(super) fn sort(&mut self, springs: &[Spring], diagonal: &[Block6]) -> bool {
         let stiffness = springs.iter().map(|spring| stiffness_at_point(spring, diagonal));
         let stiffest = stiffness.fold(0.0, f64::max);
         self.active = stiffest <= STIFFEST;
@@ -83,7 +83,7 @@ impl StepGrid {
 
     /// Estimates eigenvalues if they are not known for the operator `A` with the soft `springs`. Its diagonal blocks
     /// have the inverses `inverse`.
-    pub fn complete(
+    pub(super) fn complete(
         &mut self,
         team: &mut Team,
         A: &mut dyn LinearOperator,
@@ -97,7 +97,7 @@ impl StepGrid {
 
     /// The same with stiff `springs`, of which `A` has none. `bare` gives the inverse of the diagonal block of a copy
     /// without springs.
-    pub fn complete_stiff(
+    pub(super) fn complete_stiff(
         &mut self,
         team: &mut Team,
         A: &mut dyn LinearOperator,
@@ -113,12 +113,12 @@ impl StepGrid {
     }
 
     /// Whether the springs of the present solve allow cycles.
-    pub fn is_active(&self) -> bool {
+    pub(super) fn is_active(&self) -> bool {
         self.active
     }
 
     /// One cycle as a preconditioner.
-    pub fn cycle<'a>(&'a mut self, inverse: &'a [Inverse3]) -> Cycle<'a> {
+    pub(super) fn cycle<'a>(&'a mut self, inverse: &'a [Inverse3]) -> Cycle<'a> {
         Cycle { multigrid: &mut self.multigrid, inverse, largest: self.largest }
     }
 }

@@ -11,7 +11,7 @@ pub(crate) struct Bounds;
 
 impl Bounds {
     /// Its corners [m]; `None` without points, or where one of them is not finite.
-    pub fn of(points: &[Vector3<f64>]) -> Option<[Vector3<f64>; 2]> {
+    pub(crate) fn of(points: &[Vector3<f64>]) -> Option<[Vector3<f64>; 2]> {
         let finite = points.iter().all(|p| p.iter().all(|c| c.is_finite()));
         let (first, rest) = points.split_first().filter(|_| finite)?;
         Some(rest.iter().fold([*first; 2], |[low, high], p| [low.inf(p), high.sup(p)]))

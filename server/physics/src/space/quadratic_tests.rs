@@ -12,7 +12,7 @@ use scindo_matter::element::quadrature::tet_degree_5;
 use scindo_matter::element::tet10;
 use scindo_matter::element::{FixedCopy, Held};
 use scindo_matter::material::{Law, Material, Rayleigh};
-use scindo_matter::mesh::{BoxPattern, TET_FACES, box_mesh};
+use scindo_matter::mesh::{BoxPattern, box_mesh};
 use scindo_matter::team::Team;
 
 use super::{Space, Tets};
@@ -224,15 +224,10 @@ fn for_material(tets: &Tets, visit: &mut dyn FnMut(usize, Vector3<f64>, Vector3<
 
 /// Calls `visit` with piece, reference coordinates, place [m] and outward area [m²] of points on the lips of cuts.
 fn for_lips(tets: &Tets, visit: &mut dyn FnMut(usize, Vector3<f64>, Vector3<f64>, Vector3<f64>)) {
-    let fragments = &tets.cut.fragments;
-    for (t, tet) in fragments.tets.iter().enumerate() {
-        for (face, _) in fragments.tag[t].iter().enumerate().filter(|(_, tag)| **tag > 0) {
-            let e = fragments.element[t] as usize;
-            let nodes = tets.mesh().tets[e];
-            let corners = tets.mesh().corners(e);
-            let at = |v: u32| nodes.map(|node| fragments.vertices[v as usize].weight_of(node));
-            let triangle = TET_FACES[face].map(|c| at(tet[c]));
-            let place = |at: &[f64; 4]| corners.iter().zip(at).map(|(X, w)| *w * X).sum::<Vector3<f64>>();
+    for p in 0..tets.n_pieces() {
+        let corners = tets.mesh().corners(tets.pieces()[p].element as usize);
+        let place = |at: &[f64; 4]| corners.iter().zip(at).map(|(X, w)| *w * X).sum::<Vector3<f64>>();
+        for triangle in tets.cut.lip_fragments(p) {
             let X = triangle.each_ref().map(place);
             let area = 0.5 * (X[1] - X[0]).cross(&(X[2] - X[0]));
             // Six points, exact to degree 4 (Strang, Fix 1973).
@@ -243,12 +238,7 @@ fn for_lips(tets: &Tets, visit: &mut dyn FnMut(usize, Vector3<f64>, Vector3<f64>
                 for k in 0..3 {
                     let L: [f64; 3] = std::array::from_fn(|v| if v == k { 1.0 - 2.0 * a } else { a });
                     let at: [f64; 4] = std::array::from_fn(|n| (0..3).map(|v| L[v] * triangle[v][n]).sum());
-                    visit(
-                        fragments.piece[t] as usize,
-                        Vector3::new(at[1], at[2], at[3]),
-                        place(&at),
-                        w * area,
-                    );
+                    visit(p, Vector3::new(at[1], at[2], at[3]), place(&at), w * area);
                 }
             }
         }

@@ -10,7 +10,7 @@ use crate::error::RuntimeError;
 
 /// Replaces this program by `program`, with the same arguments: the one beside this program, else the one on the PATH.
 /// Signals, output and exit code are then those of `program`. Returns only if that fails.
-pub fn run(program: &'static str, command: &'static str) -> RuntimeError {
+pub(super) fn run(program: &'static str, command: &'static str) -> RuntimeError {
     let beside = beside(program).filter(|path| path.exists());
     let found = beside.unwrap_or_else(|| PathBuf::from(program));
     let error = Command::new(&found).args(env::args_os().skip(1)).exec();

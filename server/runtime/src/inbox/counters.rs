@@ -15,14 +15,14 @@ pub(super) struct Counters {
 
 impl Counters {
     /// Counts `more` refusals and returns the count of their kind.
-    pub fn count(&mut self, code: &'static str, more: u64) -> u64 {
+    pub(super) fn count(&mut self, code: &'static str, more: u64) -> u64 {
         let count = self.refused.entry(code).or_default();
         *count += more;
         *count
     }
 
     /// Refusals by reason.
-    pub fn refused(&self) -> &BTreeMap<&'static str, u64> {
+    pub(super) fn refused(&self) -> &BTreeMap<&'static str, u64> {
         &self.refused
     }
 }

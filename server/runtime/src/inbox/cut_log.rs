@@ -91,12 +91,12 @@ pub(super) struct CutLog {
 }
 
 impl CutLog {
-    pub fn new(bodies: BTreeSet<Arc<str>>) -> Self {
+    pub(super) fn new(bodies: BTreeSet<Arc<str>>) -> Self {
         Self { bodies, ..Self::default() }
     }
 
     /// Looks up a repeated command. `None` if the command is new.
-    pub fn known(&self, command: &CutCommand) -> Option<Cut> {
+    pub(super) fn known(&self, command: &CutCommand) -> Option<Cut> {
         let log = self.logs.get(&(command.client_id.clone(), command.tool_id.clone()))?;
         if log.waiting.contains(&command.seq) {
             return Some(Cut::Waiting);
@@ -109,7 +109,11 @@ impl CutLog {
     }
 
     /// Queues a new command. If the logs are full, it drops those of clients that have left.
-    pub fn accept(&mut self, command: &CutCommand, is_here: impl Fn(&str) -> bool) -> Result<(), Refusal> {
+    pub(super) fn accept(
+        &mut self,
+        command: &CutCommand,
+        is_here: impl Fn(&str) -> bool,
+    ) -> Result<(), Refusal> {
         let body = match &*command.body_id {
             "" => None,
             id => Some(self.bodies.get(id).cloned().ok_or_else(|| self.unknown_body(id))?),
@@ -140,7 +144,7 @@ impl CutLog {
 
     /// Remembers the answer to a command that was refused before it was queued. Where there is no place for it, a copy
     /// that arrives later is judged anew.
-    pub fn remember(&mut self, answer: &CutAck, is_here: impl Fn(&str) -> bool) {
+    pub(super) fn remember(&mut self, answer: &CutAck, is_here: impl Fn(&str) -> bool) {
         if let Ok(log) = self.log_of(&answer.client_id, &answer.tool_id, is_here) {
             log.store(answer.clone());
         }
@@ -197,19 +201,19 @@ impl CutLog {
     }
 
     /// Moves the queue into `cuts`.
-    pub fn take(&mut self, cuts: &mut Vec<CutRequest>) {
+    pub(super) fn take(&mut self, cuts: &mut Vec<CutRequest>) {
         cuts.clear();
         cuts.extend(self.queue.drain(..));
     }
 
     /// Empties the queue and returns a failed outcome for each cut in it.
-    pub fn discard(&mut self, reason: &str) -> Vec<CutOutcome> {
+    pub(super) fn discard(&mut self, reason: &str) -> Vec<CutOutcome> {
         let failed = |cut: CutRequest| CutOutcome { request: cut.request, result: Err(reason.to_owned()) };
         self.queue.drain(..).map(failed).collect()
     }
 
     /// Turns outcomes into answers and stores the answers for repetitions.
-    pub fn finish(&mut self, outcomes: &[CutOutcome], with: &Answering<'_>) -> Vec<CutAck> {
+    pub(super) fn finish(&mut self, outcomes: &[CutOutcome], with: &Answering<'_>) -> Vec<CutAck> {
         let mut answers = Vec::with_capacity(outcomes.len());
         for outcome in outcomes {
             let Some(ticket) = self.tickets.remove(&outcome.request) else { continue };
@@ -244,7 +248,7 @@ impl CutLog {
         ack
     }
 
-    pub fn applied(&self) -> u64 {
+    pub(super) fn applied(&self) -> u64 {
         self.applied
     }
 }

@@ -125,12 +125,12 @@ pub(super) struct Owners {
 }
 
 impl Owners {
-    pub fn new(scene_tools: BTreeSet<Arc<str>>) -> Self {
+    pub(super) fn new(scene_tools: BTreeSet<Arc<str>>) -> Self {
         Self { scene_tools, ..Self::default() }
     }
 
     /// Registers a token of `client` and returns the poses that waited for it.
-    pub fn came(&mut self, client: &str, now: Instant) -> Vec<ToolSample> {
+    pub(super) fn came(&mut self, client: &str, now: Instant) -> Vec<ToolSample> {
         if let Some(known) = self.here.get_mut(client) {
             known.tokens += 1;
         } else if self.here.len() < MAX_CLIENTS || self.dismiss_idle() {
@@ -158,7 +158,7 @@ impl Owners {
     }
 
     /// Removes a token of `client`. The last one releases its tools.
-    pub fn went(&mut self, client: &str, now: Instant) -> Vec<Change> {
+    pub(super) fn went(&mut self, client: &str, now: Instant) -> Vec<Change> {
         let Some(present) = self.here.get_mut(client) else { return Vec::new() };
         present.tokens -= 1;
         if present.tokens > 0 {
@@ -178,22 +178,22 @@ impl Owners {
     }
 
     /// Notes what a client that is here says that it is.
-    pub fn is_a(&mut self, client: &str, role: Role) {
+    pub(super) fn is_a(&mut self, client: &str, role: Role) {
         if self.here.contains_key(client) {
             self.roles.insert(client.to_owned(), role);
         }
     }
 
     /// Clients that are here and what they are, in the order of their ids.
-    pub fn clients(&self) -> impl ExactSizeIterator<Item = (&str, Role)> {
+    pub(super) fn clients(&self) -> impl ExactSizeIterator<Item = (&str, Role)> {
         self.here.keys().map(|id| (&**id, self.roles.get(id).copied().unwrap_or(Role::Client)))
     }
 
-    pub fn is_here(&self, client: &str) -> bool {
+    pub(super) fn is_here(&self, client: &str) -> bool {
         self.here.contains_key(client)
     }
 
-    pub fn pose(
+    pub(super) fn pose(
         &mut self,
         key_tool: &str,
         sample: &ToolSample,
@@ -297,7 +297,7 @@ impl Owners {
     }
 
     /// Whether `client` may cut with a tool: the client is present, and nobody else holds the tool.
-    pub fn may_cut(&mut self, tool: &str, client: &str) -> Result<(), Refusal> {
+    pub(super) fn may_cut(&mut self, tool: &str, client: &str) -> Result<(), Refusal> {
         if !self.is_here(client) {
             return Err(no_token(client));
         }
@@ -310,7 +310,7 @@ impl Owners {
         }
     }
 
-    pub fn capability(&mut self, capability: DeviceCapability) {
+    pub(super) fn capability(&mut self, capability: DeviceCapability) {
         if let Some(held) = self.held.get_mut(&*capability.tool_id)
             && *held.input.owner == *capability.client_id
         {
@@ -318,12 +318,12 @@ impl Owners {
         }
     }
 
-    pub fn held(&self) -> impl Iterator<Item = &ToolInput> {
+    pub(super) fn held(&self) -> impl Iterator<Item = &ToolInput> {
         self.held.values().map(|held| &held.input)
     }
 
     /// Moves what the clients hold into `tools`, for a step.
-    pub fn take(&mut self, tools: &mut Vec<ToolInput>) {
+    pub(super) fn take(&mut self, tools: &mut Vec<ToolInput>) {
         tools.clear();
         for held in self.held.values_mut() {
             let mut input = held.input.clone();
@@ -333,11 +333,11 @@ impl Owners {
         }
     }
 
-    pub fn capability_of(&self, tool: &str) -> Option<&DeviceCapability> {
+    pub(super) fn capability_of(&self, tool: &str) -> Option<&DeviceCapability> {
         self.held.get(tool)?.capability.as_ref()
     }
 
-    pub fn figures(&self) -> impl Iterator<Item = ToolFigures> {
+    pub(super) fn figures(&self) -> impl Iterator<Item = ToolFigures> {
         self.held.iter().map(|(tool, &Held { poses, contact_age_ms, one_way, ref name, .. })| ToolFigures {
             tool: tool.clone(),
             name: name.clone(),

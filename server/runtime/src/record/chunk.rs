@@ -7,11 +7,11 @@ use mcap::records::ChunkHeader;
 use super::mcap_writer::PREFIX;
 
 /// Longest record of a file, and longest chunk before it was packed [byte]: a checkpoint of the largest scenes.
-pub const LONGEST: usize = 4 << 30;
+pub(super) const LONGEST: usize = 4 << 30;
 
 /// The records of a chunk, one after the other.
 #[derive(Default)]
-pub struct Chunk {
+pub(super) struct Chunk {
     bytes: Vec<u8>,
     /// Where the next record begins.
     at: usize,
@@ -23,7 +23,7 @@ impl Chunk {
     ///
     /// # Errors
     /// Words for what is wrong: how it is packed, its size, or its checksum.
-    pub fn unpack(&mut self, header: &ChunkHeader, packed: &[u8]) -> Result<(), String> {
+    pub(super) fn unpack(&mut self, header: &ChunkHeader, packed: &[u8]) -> Result<(), String> {
         self.bytes.clear();
         self.at = 0;
         let size = header.uncompressed_size;
@@ -52,7 +52,7 @@ impl Chunk {
     }
 
     /// Kind and content of the next record; `None` at the end.
-    pub fn next_record(&mut self) -> Option<Result<(u8, &[u8]), String>> {
+    pub(super) fn next_record(&mut self) -> Option<Result<(u8, &[u8]), String>> {
         let rest = &self.bytes[self.at..];
         if rest.is_empty() {
             return None;

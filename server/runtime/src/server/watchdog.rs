@@ -7,17 +7,17 @@ use std::time::{Duration, Instant};
 use crate::exchange::Exchange;
 
 /// A step is broken off when it keeps an order waiting for this long.
-pub const ORDER_PATIENCE: Duration = Duration::from_millis(400);
+pub(super) const ORDER_PATIENCE: Duration = Duration::from_millis(400);
 
 /// How often the thread checks.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Longest time that threads may take to end after they were told to.
-pub const END_PATIENCE: Duration = Duration::from_millis(4000);
+pub(super) const END_PATIENCE: Duration = Duration::from_millis(4000);
 
 /// Watches the threads until all have ended. If they take too long after they were told to end, it calls
 /// `give_up` with the reason. A program ends its process there.
-pub fn run(exchange: &Arc<Exchange>, give_up: fn(&str)) {
+pub(super) fn run(exchange: &Arc<Exchange>, give_up: fn(&str)) {
     let mut told: Option<Instant> = None;
     while !exchange.closed() {
         std::thread::sleep(LOOK);

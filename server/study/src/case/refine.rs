@@ -11,7 +11,7 @@ use super::subdivide::Subdivisions;
 use crate::design::axes::Setting;
 
 /// Factors tried for levels, about √2 apart.
-pub const FACTORS: [f64; 10] = [0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0];
+pub(super) const FACTORS: [f64; 10] = [0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0];
 
 /// Largest ratio of a level to its factor, and largest logarithmic unevenness of its cells along the axes.
 const ROOM: f64 = 1.15;
@@ -21,7 +21,7 @@ const UNEVEN: f64 = 0.07;
 const ON_FACE: f64 = 0.05;
 
 /// Levels that refine the scene evenly, coarse to fine. `make` builds the setting for a factor.
-pub fn levels(scene: &CheckedScene, make: &dyn Fn(f64) -> Option<Setting>) -> Vec<Setting> {
+pub(super) fn levels(scene: &CheckedScene, make: &dyn Fn(f64) -> Option<Setting>) -> Vec<Setting> {
     let mut found: Vec<Setting> = Vec::new();
     for setting in FACTORS.iter().filter_map(|target| make(even(scene, *target)?)) {
         if found.last().is_none_or(|last| setting.size > 1.1 * last.size) {
@@ -70,7 +70,7 @@ fn range(mesh: &MeshSource) -> [usize; 2] {
 /// All meshes with their cells times `factor`, as a user would write them. The size of the setting is the
 /// factor after rounding, from the cube root of the number of cells. `None` if nothing changes or a body does
 /// not allow it.
-pub fn cells(scene: &CheckedScene, files: &Subdivisions, factor: f64) -> Option<Setting> {
+pub(super) fn cells(scene: &CheckedScene, files: &Subdivisions, factor: f64) -> Option<Setting> {
     refined(scene, files, factor, &|body, counts| match &body.mesh {
         MeshSource::Box { .. } => Some(format!("body.{}.mesh.box.cells={counts:?}", body.id)),
         MeshSource::Grid { lines_m, .. } => {
@@ -90,7 +90,12 @@ pub fn cells(scene: &CheckedScene, files: &Subdivisions, factor: f64) -> Option<
 
 /// Like [`cells`], with blocks whose coordinates lie on the faces of all regions of the scene. `split`
 /// decides how their cells are split. Octree cells stay cubes. `None` if there are too few cells for the faces.
-pub fn aligned(scene: &CheckedScene, files: &Subdivisions, factor: f64, split: Split) -> Option<Setting> {
+pub(super) fn aligned(
+    scene: &CheckedScene,
+    files: &Subdivisions,
+    factor: f64,
+    split: Split,
+) -> Option<Setting> {
     refined(scene, files, factor, &|body, counts| match &body.mesh {
         MeshSource::Box { .. } if split.keeps_cubes(body) => {
             Some(format!("body.{}.mesh.box.cells={counts:?}", body.id))
@@ -113,7 +118,12 @@ pub fn aligned(scene: &CheckedScene, files: &Subdivisions, factor: f64, split: S
 }
 
 /// Like [`aligned`], but coordinates stay where they are, wherever regions end.
-pub fn uneven(scene: &CheckedScene, files: &Subdivisions, factor: f64, split: Split) -> Option<Setting> {
+pub(super) fn uneven(
+    scene: &CheckedScene,
+    files: &Subdivisions,
+    factor: f64,
+    split: Split,
+) -> Option<Setting> {
     let mut setting = cells(scene, files, factor)?;
     for body in &scene.bodies {
         let (kind, own) = match &body.mesh {
@@ -129,7 +139,7 @@ pub fn uneven(scene: &CheckedScene, files: &Subdivisions, factor: f64, split: Sp
 
 /// How the cells of a block are split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Split {
+pub(super) enum Split {
     /// As the scene says.
     Own,
     /// Into tetrahedra: as the scene says, otherwise six per cell.

@@ -17,7 +17,7 @@ const MOST_TETS: usize = 400_000;
 
 /// A refined copy of a file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Level {
+pub(super) struct Level {
     /// Ratio of the file's edge length to the edge length of this copy.
     pub factor: f64,
     /// Number of elements.
@@ -28,7 +28,7 @@ pub struct Level {
 
 impl Level {
     /// Overrides that use the copy in the scene.
-    pub fn overrides(&self, body: &str) -> Vec<String> {
+    pub(super) fn overrides(&self, body: &str) -> Vec<String> {
         let Some(path) = &self.path else { return Vec::new() };
         let path = path.display();
         let mesh = |key: &str, value: &str| format!("body.{body}.mesh.{key}={value}");
@@ -39,7 +39,7 @@ impl Level {
 
 /// Refined copies of the mesh files of a scene, per body.
 #[derive(Debug, Clone, Default)]
-pub struct Subdivisions {
+pub(super) struct Subdivisions {
     bodies: BTreeMap<usize, Vec<Level>>,
 }
 
@@ -49,7 +49,7 @@ impl Subdivisions {
     ///
     /// # Errors
     /// The directory or a file in it cannot be written.
-    pub fn write(scene: &CheckedScene, base_dir: &Path, directory: &Path) -> Result<Self, String> {
+    pub(super) fn write(scene: &CheckedScene, base_dir: &Path, directory: &Path) -> Result<Self, String> {
         let mut bodies = BTreeMap::new();
         for (i, body) in scene.bodies.iter().enumerate() {
             let MeshSource::File { path, scale, weld } = &body.mesh else { continue };
@@ -75,7 +75,7 @@ impl Subdivisions {
     }
 
     /// The copy whose edges are `factor` times finer, to within a quarter; `None` if there is none.
-    pub fn level(&self, body: usize, factor: f64) -> Option<&Level> {
+    pub(super) fn level(&self, body: usize, factor: f64) -> Option<&Level> {
         self.bodies.get(&body)?.iter().find(|level| (level.factor / factor).ln().abs() < 0.22)
     }
 }
@@ -86,7 +86,7 @@ fn parts_of(tets: &[u32]) -> Vec<u32> {
 }
 
 /// Splits every tetrahedron into eight, which follow each other.
-pub fn split(mesh: &TetMesh) -> TetMesh {
+pub(super) fn split(mesh: &TetMesh) -> TetMesh {
     let mut nodes = mesh.nodes.clone();
     let mut middles = BTreeMap::new();
     let mut tets = Vec::with_capacity(8 * mesh.tets.len());

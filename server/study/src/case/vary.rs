@@ -14,11 +14,11 @@ use crate::design::axes::{Axis, Factor, Setting, on_bodies, step, threads, toler
 pub const LAWS: [&str; 4] = ["linear", "corotational", "stvk", "neo-hookean"];
 
 /// Label of a base that has no name of its own.
-pub const OWN: &str = "as in the scene";
+pub(super) const OWN: &str = "as in the scene";
 
 /// A scene whose settings are varied.
 #[derive(Debug, Clone, Copy)]
-pub struct Subject<'a> {
+pub(super) struct Subject<'a> {
     /// The scene with its names resolved.
     pub scene: &'a CheckedScene,
     /// The scene as it was written.
@@ -31,7 +31,7 @@ pub struct Subject<'a> {
 
 impl Subject<'_> {
     /// The value of a key if all bodies agree on it; `None` if they differ.
-    pub fn word(&self, key: &str, default: &str) -> Option<String> {
+    pub(super) fn word(&self, key: &str, default: &str) -> Option<String> {
         let bodies = self.tree["body"].as_array()?;
         let of = |body: &Value| {
             let value = key.split('.').fold(body, |at, part| &at[part]);
@@ -51,7 +51,12 @@ impl Subject<'_> {
 }
 
 /// The axes of a scene. `cells_wanted`: cells along the longest side, which replace the default meshes.
-pub fn axes(of: Subject<'_>, quick: bool, cells_wanted: &[usize], threads_wanted: &[usize]) -> Vec<Axis> {
+pub(super) fn axes(
+    of: Subject<'_>,
+    quick: bool,
+    cells_wanted: &[usize],
+    threads_wanted: &[usize],
+) -> Vec<Axis> {
     let integrator = of.word("integrator", "implicit-euler");
     let explicit = of.scene.bodies.iter().any(|body| body.mechanics.integrator.is_explicit());
     let is_static = integrator.as_deref() == Some("static");
@@ -123,7 +128,7 @@ fn elements(of: Subject<'_>) -> Axis {
 }
 
 /// Overrides for an element, with the split of cells that it needs.
-pub fn element(of: Subject<'_>, label: &str) -> Vec<String> {
+pub(super) fn element(of: Subject<'_>, label: &str) -> Vec<String> {
     let (element, locking) = label.split_once(' ').unwrap_or((label, "none"));
     let mut set = on_bodies(of.bodies, "element", &format!("\"{element}\""));
     set.extend(on_bodies(of.bodies, "locking", &format!("\"{locking}\"")));
@@ -178,7 +183,7 @@ fn steps(own_s: f64, factors: &[f64]) -> Axis {
 }
 
 /// Factors that interact: mesh and step first, then mesh with element, tolerance and law.
-pub fn blocks(axes: &[Axis], of: Subject<'_>) -> Vec<Block> {
+pub(super) fn blocks(axes: &[Axis], of: Subject<'_>) -> Vec<Block> {
     let labels = |factor: Factor| {
         let axis = axes.iter().find(|axis| axis.factor == factor);
         axis.map(|axis| axis.settings.iter().map(|s| s.label.clone()).collect::<Vec<_>>()).unwrap_or_default()

@@ -15,7 +15,7 @@ use crate::trial::distance::Errors;
 use crate::words::{percent, short};
 
 /// A plot that stands alone, with its own style.
-pub fn picture(result: &CaseResult) -> String {
+pub(super) fn picture(result: &CaseResult) -> String {
     let mut plot = plot(result, [1000.0, 600.0], |errors| errors.l2, "displacement error");
     plot.title = Some(result.case.title.clone());
     let style = format!("<style>{}{}</style>\n", style::COLOURS, style::PLOT);
@@ -23,7 +23,7 @@ pub fn picture(result: &CaseResult) -> String {
 }
 
 /// The whole section as HTML.
-pub fn section(result: &CaseResult) -> String {
+pub(super) fn section(result: &CaseResult) -> String {
     let case = &result.case;
     let mut out = format!(
         "<section id=\"{0}\">\n<h2>{1}</h2>\n<p>{2}</p>\n",

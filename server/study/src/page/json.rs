@@ -7,7 +7,7 @@ use crate::report::result::ExperimentResult;
 use crate::result::{CaseResult, Outcome, StudyResult};
 
 /// Contents of `study.json`.
-pub fn study(study: &StudyResult) -> Value {
+pub(super) fn study(study: &StudyResult) -> Value {
     json!({
         "origin": study.origin,
         "seconds": study.seconds,

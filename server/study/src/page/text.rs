@@ -7,7 +7,7 @@ use crate::result::{CaseResult, StudyResult};
 use crate::words::percent;
 
 /// Heading, reading guide, and an overview of the cases.
-pub fn opening(study: &StudyResult) -> String {
+pub(super) fn opening(study: &StudyResult) -> String {
     let machine = &study.origin.machine;
     let mut out = "<header>\n<h1>What accuracy costs</h1>\n".to_owned();
     let _ = writeln!(
@@ -113,7 +113,7 @@ fn glance(study: &StudyResult) -> String {
 }
 
 /// Definitions, method and machine.
-pub fn method(study: &StudyResult) -> String {
+pub(super) fn method(study: &StudyResult) -> String {
     let mut out = "<section id=\"method\">\n<h2>How it was measured</h2>\n<dl>\n".to_owned();
     // Experiments say themselves what they measure.
     for (term, meaning) in DEFINITIONS.iter().filter(|_| !study.cases.is_empty()) {

@@ -9,7 +9,7 @@ use crate::trial::wear::{CUTS, Wear};
 use crate::words::percent;
 
 /// The table; empty if the case does not compare methods of cutting.
-pub fn table(result: &CaseResult) -> String {
+pub(super) fn table(result: &CaseResult) -> String {
     let rows: Vec<&Outcome> = result.points.iter().filter(|point| !point.trial.wear.is_empty()).collect();
     if rows.is_empty() {
         return String::new();

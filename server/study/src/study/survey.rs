@@ -38,7 +38,7 @@ const RUN_S: [f64; 2] = [12.0, 3.0];
 const TOO_SLOW: f64 = 6.0;
 
 /// Studies `case` within `seconds`.
-pub fn study(bench: &mut Bench<'_>, mut case: Case, seconds: f64) -> CaseResult {
+pub(super) fn study(bench: &mut Bench<'_>, mut case: Case, seconds: f64) -> CaseResult {
     bench.begin(&case.name, seconds);
     let mut notes = std::mem::take(&mut case.notes);
     let reference = match case.truth.clone() {

@@ -18,7 +18,7 @@ use crate::scene::checked::Region;
 use crate::scene::{BodySpec, CellSplit, Fault, MaterialPlace, MaterialSpec, MeshSource, OctreeSpec};
 
 /// The elements of a body.
-pub enum Mesh {
+pub(crate) enum Mesh {
     /// Tetrahedra, linear or to be made quadratic.
     Tets(TetMesh),
     /// Hexahedra.
@@ -29,7 +29,7 @@ pub enum Mesh {
 
 impl Mesh {
     /// Number of nodes.
-    pub fn n_nodes(&self) -> usize {
+    pub(crate) fn n_nodes(&self) -> usize {
         match self {
             Mesh::Tets(mesh) => mesh.nodes.len(),
             Mesh::Hexes(mesh) => mesh.nodes.len(),
@@ -38,7 +38,7 @@ impl Mesh {
     }
 
     /// Centres of the tetrahedra or hexahedra [m]; cells of an octree have their materials already.
-    pub fn centres(&self) -> Vec<Vector3<f64>> {
+    pub(crate) fn centres(&self) -> Vec<Vector3<f64>> {
         match self {
             Mesh::Tets(mesh) => {
                 let centre = |e: usize| mesh.corners(e).iter().sum::<Vector3<f64>>() / 4.0;
@@ -53,7 +53,7 @@ impl Mesh {
     }
 
     /// Corners of the bounding box [m].
-    pub fn bounds(&self) -> [Vector3<f64>; 2] {
+    pub(crate) fn bounds(&self) -> [Vector3<f64>; 2] {
         match self {
             Mesh::Tets(mesh) => mesh.bounds(),
             Mesh::Hexes(mesh) => mesh.nodes.iter().fold(
@@ -65,7 +65,7 @@ impl Mesh {
     }
 
     /// Nodes along the longest way through the mesh.
-    pub fn nodes_along(&self) -> f64 {
+    pub(crate) fn nodes_along(&self) -> f64 {
         let [low, high] = self.bounds();
         let (extent, nodes) = (high - low, self.n_nodes() as f64);
         if let Mesh::Octree(octree) = self {
@@ -78,7 +78,7 @@ impl Mesh {
 }
 
 /// A mesh and what was found and repaired in its file.
-pub struct Opened {
+pub(crate) struct Opened {
     pub mesh: Mesh,
     pub health: Option<MeshHealth>,
 }
@@ -94,7 +94,7 @@ impl Opened {
 }
 
 /// Opens or makes a mesh; paths are relative to `base_dir`.
-pub fn open(source: &MeshSource, base_dir: &Path, observer: &Observer<'_>) -> Result<Opened, Fault> {
+pub(crate) fn open(source: &MeshSource, base_dir: &Path, observer: &Observer<'_>) -> Result<Opened, Fault> {
     fits(source)?;
     match source {
         MeshSource::Box { min_m, max_m, cells, split } => Ok(Opened::made(match pattern(*split) {
@@ -125,7 +125,7 @@ pub fn open(source: &MeshSource, base_dir: &Path, observer: &Observer<'_>) -> Re
 }
 
 /// Fills the mesh of `body` with the cells of `octree`; paths are relative to `base_dir`.
-pub fn fill(
+pub(crate) fn fill(
     body: &BodySpec,
     octree: OctreeSpec,
     base_dir: &Path,
@@ -166,7 +166,7 @@ pub fn fill(
 /// The regions of other materials in a mesh of tetrahedra or hexahedra: the last one that holds the centre of an
 /// element, or whose group it belongs to, counts. Paths are relative to `base_dir`. The fault comes with the number of
 /// its region.
-pub fn regions(
+pub(crate) fn regions(
     body: &BodySpec,
     centres: &[Vector3<f64>],
     groups: &[CellGroup],
@@ -314,7 +314,7 @@ fn fits(source: &MeshSource) -> Result<(), Fault> {
 }
 
 /// Leaves only the part of the largest volume. The tetrahedra that remain, if there was another part.
-pub fn keep_largest_part(mesh: &mut TetMesh) -> Option<Vec<u32>> {
+pub(crate) fn keep_largest_part(mesh: &mut TetMesh) -> Option<Vec<u32>> {
     let (part, count) = components(mesh);
     let mut volumes = vec![0.0; count];
     (0..mesh.tets.len()).for_each(|e| volumes[part[e] as usize] += mesh.volume(e));
@@ -355,7 +355,7 @@ pub(super) fn fault(error: MeshInError) -> Fault {
 }
 
 /// What reading a mesh file has changed that may have been meant otherwise.
-pub fn doubts_about_repair(health: Option<&MeshHealth>) -> Option<String> {
+pub(crate) fn doubts_about_repair(health: Option<&MeshHealth>) -> Option<String> {
     let Some(MeshHealth::Volume(VolumeHealth { welded_nodes: joined, .. })) = health else { return None };
     (*joined > 0).then(|| {
         format!(
@@ -367,7 +367,7 @@ pub fn doubts_about_repair(health: Option<&MeshHealth>) -> Option<String> {
 
 /// Suspicions about units, each in a sentence: a mesh in millimetres read as metres is a thousand
 /// times too large.
-pub fn doubts_about_scale([low, high]: [Vector3<f64>; 2], spec: &BodySpec) -> Vec<String> {
+pub(crate) fn doubts_about_scale([low, high]: [Vector3<f64>; 2], spec: &BodySpec) -> Vec<String> {
     let scale = match spec.mesh {
         MeshSource::File { scale, .. } | MeshSource::Surface { scale, .. } => scale,
         MeshSource::Box { .. } | MeshSource::Grid { .. } | MeshSource::Organ { .. } => 1.0,

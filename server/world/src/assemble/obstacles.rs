@@ -12,7 +12,7 @@ use crate::scene::{Fault, ObstacleSpec, Solid};
 use crate::tool::obstacle::{Obstacle, Shape};
 
 /// The obstacle of `spec`; paths are relative to `base_dir`.
-pub fn open(spec: &ObstacleSpec, base_dir: &Path) -> Result<Obstacle, Fault> {
+pub(super) fn open(spec: &ObstacleSpec, base_dir: &Path) -> Result<Obstacle, Fault> {
     let shape = match &spec.solid {
         Solid::HalfSpace { point_m, normal } => Shape::HalfSpace { point: *point_m, normal: *normal },
         Solid::Box { min_m, max_m } => Shape::Box { min: *min_m, max: *max_m },

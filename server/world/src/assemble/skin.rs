@@ -22,7 +22,7 @@ const REACH: f64 = 0.75;
 const ENOUGH: f64 = 0.99;
 
 /// Puts the skin on `body`, whose mesh comes from `source`; paths are relative to `base_dir`. Returns what is odd about it.
-pub fn put_on(
+pub(super) fn put_on(
     body: &mut Body,
     spec: &SkinSpec,
     source: &MeshSource,

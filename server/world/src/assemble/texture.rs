@@ -14,7 +14,7 @@ const MAX_PIXELS: usize = 8192;
 
 /// The texture of a body whose mesh comes from `source`; paths are relative to `base_dir`. Its skin is `worn` if it consists
 /// of triangles of a surface. The fault comes with its key.
-pub fn load(
+pub(super) fn load(
     spec: &TextureSpec,
     source: &MeshSource,
     worn: bool,

@@ -10,7 +10,7 @@ use scindo_physics::team::{Lead, Team};
 use crate::body::SimBody;
 
 /// Threads that a body starts when it is made, in a scene of `bodies` bodies.
-pub fn of_one_body(bodies: usize, threads: usize) -> usize {
+pub(super) fn of_one_body(bodies: usize, threads: usize) -> usize {
     if bodies > 1 { 1 } else { threads }
 }
 
@@ -18,7 +18,7 @@ pub fn of_one_body(bodies: usize, threads: usize) -> usize {
 ///
 /// # Errors
 /// A number of threads out of range, or threads that cannot be started.
-pub fn share(bodies: &mut [SimBody], threads: usize) -> Result<Option<Lead>, BodyError> {
+pub(super) fn share(bodies: &mut [SimBody], threads: usize) -> Result<Option<Lead>, BodyError> {
     if bodies.len() < 2 {
         return Ok(None);
     }

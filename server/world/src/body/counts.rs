@@ -148,7 +148,13 @@ pub(crate) struct Watch {
 impl Watch {
     /// Counts a step, and reports troubles that begin or end. If the scene sets a fixed number of iterations,
     /// unconverged steps are counted but not reported.
-    pub fn follow(&mut self, body: &Arc<str>, solve: &SolveReport, fixed: bool, report: &mut StepReport) {
+    pub(super) fn follow(
+        &mut self,
+        body: &Arc<str>,
+        solve: &SolveReport,
+        fixed: bool,
+        report: &mut StepReport,
+    ) {
         self.count(solve);
         for (trouble, spell) in Trouble::ALL.into_iter().zip(&mut self.spells) {
             if fixed && trouble == Trouble::Unconverged {
@@ -201,7 +207,7 @@ impl Watch {
     }
 
     /// One line per trouble that the body has had, with numbers and a remedy.
-    pub fn warnings(&self, id: &str, body: &Body, fixed: bool) -> Vec<String> {
+    pub(super) fn warnings(&self, id: &str, body: &Body, fixed: bool) -> Vec<String> {
         let StepCounts { steps, refused, divided, rolled_back, inverted, .. } = self.counts;
         let mut lines = Vec::new();
         let mut add = |text: String| lines.push(format!("body `{id}`: {text}"));
@@ -254,7 +260,7 @@ impl Watch {
     }
 
     /// Why the run counts as failed for this body, if it does.
-    pub fn failure(&self, id: &str, body: &Body, fixed: bool) -> Option<String> {
+    pub(super) fn failure(&self, id: &str, body: &Body, fixed: bool) -> Option<String> {
         let StepCounts { steps, unconverged, refused, rolled_back, .. } = self.counts;
         let mut reasons = Vec::new();
         if refused > 0 {

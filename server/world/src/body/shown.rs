@@ -37,7 +37,7 @@ impl SurfaceTopology {
 }
 
 /// Triangles of the present epoch, their rest positions, and what holds them. Sleeping parts are not shown.
-pub fn topology(body: &Body) -> SurfaceTopology {
+pub(super) fn topology(body: &Body) -> SurfaceTopology {
     let surface = body.surface();
     let rest = body.rest_positions();
     let held = held_copies(body);
@@ -66,7 +66,7 @@ pub fn topology(body: &Body) -> SurfaceTopology {
 
 /// Writes the von Mises stress [Pa] of every surface vertex into `out`. It is the mean over the material
 /// around each copy, weighted by volume and interpolated like positions.
-pub fn surface_stress(body: &Body, out: &mut Vec<f32>) {
+pub(super) fn surface_stress(body: &Body, out: &mut Vec<f32>) {
     let mut mean = vec![(0.0, 0.0); body.n_copies()];
     let stresses = body.cauchy_stresses();
     body.for_pieces(&mut |element, copies, volumes| {
@@ -89,7 +89,7 @@ pub fn surface_stress(body: &Body, out: &mut Vec<f32>) {
 }
 
 /// √(3/2 s:s) of the deviator s [Pa].
-pub fn von_mises(stress: &Matrix3<f64>) -> f64 {
+pub(crate) fn von_mises(stress: &Matrix3<f64>) -> f64 {
     let deviator = stress - Matrix3::from_diagonal_element(stress.trace() / 3.0);
     (1.5 * deviator.norm_squared()).sqrt()
 }

@@ -16,7 +16,11 @@ const LEAST_M: f64 = 1e-5;
 /// Where the scalpel cuts now: from its depth below the skin to above it [m]; `None` where it does not press enough.
 /// The depth is the way of the hand beyond the skin, f/k, where the toughness J [J/m²] of the body takes J times the
 /// tool's width off the force.
-pub fn segment(tool: &Tool, press: &Press, toughness: impl Fn(usize) -> f64) -> Option<[Vector3<f64>; 2]> {
+pub(super) fn segment(
+    tool: &Tool,
+    press: &Press,
+    toughness: impl Fn(usize) -> f64,
+) -> Option<[Vector3<f64>; 2]> {
     let normal = press.normal()?;
     let body = press.bearings().first()?.body;
     let force_n = tool.force_n.dot(&normal) - toughness(body) * 2.0 * core_radius(tool.shape);

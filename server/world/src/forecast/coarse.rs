@@ -36,7 +36,7 @@ const VOLUME: f64 = 0.15;
 const FACTOR: f64 = 1.5;
 
 /// Puts what coarse copies do in place of what was only seen in part.
-pub fn follow(simulation: &Simulation, bodies: &mut [BodyForecast], growing: &[bool], effort: Effort) {
+pub(super) fn follow(simulation: &Simulation, bodies: &mut [BodyForecast], growing: &[bool], effort: Effort) {
     let mut seen: Vec<Vec<(f64, BodyForecast)>> = vec![Vec::new(); bodies.len()];
     for (elements, share) in ELEMENTS.into_iter().zip(SHARES) {
         let Some(mut copy) = copy_of(simulation, elements) else { return };

@@ -19,7 +19,7 @@ pub struct Cost {
 
 /// What the steps have cost so far.
 #[derive(Debug, Default)]
-pub struct Prices {
+pub(super) struct Prices {
     /// Of every step [s].
     steps_s: Vec<f64>,
     /// Iterations of every step since the last jump, of all bodies.
@@ -29,14 +29,14 @@ pub struct Prices {
 }
 
 impl Prices {
-    pub fn add(&mut self, seconds: f64, iterations: u32) {
+    pub(super) fn add(&mut self, seconds: f64, iterations: u32) {
         self.steps_s.push(seconds);
         self.iterations.push(iterations);
     }
 
     /// Whether the price no longer falls: the last quarter of the steps took as many iterations as those of the
     /// half before it. A body that has come to rest goes on getting cheaper for a while.
-    pub fn are_settled(&self) -> bool {
+    pub(super) fn are_settled(&self) -> bool {
         let n = self.iterations.len();
         let sum =
             |from: usize, to: usize| self.iterations[from..to].iter().map(|&i| u64::from(i)).sum::<u64>();
@@ -45,14 +45,14 @@ impl Prices {
     }
 
     /// So many steps at rest, which were not made.
-    pub fn rested(&mut self, steps: u64) {
+    pub(super) fn rested(&mut self, steps: u64) {
         self.rested.0 += steps;
         self.rested.1 += steps as f64 * self.last();
         self.iterations.clear();
     }
 
     /// Price of a run that goes on for `left` steps.
-    pub fn cost(&self, ending: Ending, left: u64) -> Cost {
+    pub(super) fn cost(&self, ending: Ending, left: u64) -> Cost {
         let made = self.steps_s.len() as f64;
         let sum: f64 = self.steps_s.iter().sum();
         let moving = sum / made.max(1.0);

@@ -17,7 +17,7 @@ const STEPS_TO_REST: [usize; 2] = [8, 3];
 const PAST: f64 = 0.4;
 
 /// See the module.
-pub struct Watch {
+pub(super) struct Watch {
     size_m: f64,
     before: Vec<Vector3<f64>>,
     event_s: f64,
@@ -31,7 +31,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    pub fn new(body: &SimBody) -> Self {
+    pub(super) fn new(body: &SimBody) -> Self {
         let (low, high) = bounds(body.body.rest_positions());
         let solver = body.body.settings().solver;
         Self {
@@ -53,7 +53,7 @@ impl Watch {
     }
 
     /// Looks at the body after a step of length `h` that ended at `time_s` [s].
-    pub fn record(&mut self, body: &SimBody, solve: &SolveReport, (time_s, h): (f64, f64)) {
+    pub(super) fn record(&mut self, body: &SimBody, solve: &SolveReport, (time_s, h): (f64, f64)) {
         self.seen.unconverged_steps += u64::from(!converged(solve));
         self.seen.refused_steps += u64::from(solve.outcome != Outcome::Advanced);
         self.seen.most_iterations = self.seen.most_iterations.max(solve.iterations);
@@ -84,14 +84,14 @@ impl Watch {
     }
 
     /// Something happens at `time_s` [s]: a cut, a tool.
-    pub fn next_event(&mut self, time_s: f64) {
+    pub(super) fn next_event(&mut self, time_s: f64) {
         self.event_s = time_s;
         self.peak = (0.0, time_s);
         self.speeds.clear();
     }
 
     /// Whether the body has come to rest since the last event.
-    pub fn rests(&self, is_static: bool) -> bool {
+    pub(super) fn rests(&self, is_static: bool) -> bool {
         let n = self.speeds.len();
         if n < STEPS_TO_REST[usize::from(is_static)] {
             return false;
@@ -104,14 +104,14 @@ impl Watch {
     }
 
     /// Whether the largest displacement may still lie ahead.
-    pub fn grows(&self) -> bool {
+    pub(super) fn grows(&self) -> bool {
         let (peak_m, peak_s) = self.peak;
         let past = self.time_s - peak_s >= PAST * (peak_s - self.event_s) && self.speeds.len() >= 3;
         !past && peak_m > 0.5 * self.seen.largest_displacement_m
     }
 
     /// What has been seen.
-    pub fn forecast(&mut self, body: &SimBody, ending: Ending) -> BodyForecast {
+    pub(super) fn forecast(&mut self, body: &SimBody, ending: Ending) -> BodyForecast {
         self.seen.least_volume_ratio = body.body.least_volume_ratio();
         self.seen.converges = self.seen.unconverged_steps + self.seen.refused_steps == 0;
         if ending == Ending::Budget && self.grows() {
@@ -122,6 +122,6 @@ impl Watch {
 }
 
 /// Whether a step reached its tolerance.
-pub fn converged(solve: &SolveReport) -> bool {
+pub(super) fn converged(solve: &SolveReport) -> bool {
     !solve.is_unconverged()
 }

@@ -11,7 +11,7 @@ use crate::scene::{BodySpec, CheckedScene};
 const ROOM: f64 = 1.3;
 
 /// Adds what goes wrong to the warnings of `forecast`.
-pub fn warnings(scene: &CheckedScene, forecast: &mut Forecast) {
+pub(super) fn warnings(scene: &CheckedScene, forecast: &mut Forecast) {
     let mut found = Vec::new();
     for (spec, body) in scene.bodies.iter().zip(&forecast.bodies) {
         let at = format!("body.{}", body.id);

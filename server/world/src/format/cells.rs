@@ -10,7 +10,7 @@ use super::mesh_file::{MeshFile, SurfaceMesh, VolumeMesh};
 
 /// Contribution of a cell of a file to the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CellKind {
+pub(super) enum CellKind {
     /// The first four nodes are the corners of a tetrahedron; `order` > 1 has more nodes after them.
     Tetrahedron {
         /// Polynomial order of the element in the file.
@@ -34,7 +34,7 @@ pub enum CellKind {
 
 /// The cells of one file, gathered while reading.
 #[derive(Default)]
-pub struct CellSoup {
+pub(super) struct CellSoup {
     tets: Vec<[i64; 4]>,
     triangles: Vec<[i64; 3]>,
     /// Number of cells so far.
@@ -50,7 +50,7 @@ impl CellSoup {
     /// Adds one cell. Returns `false` if its node count does not fit its kind. The caller must not add
     /// refused kinds.
     #[must_use]
-    pub fn add(&mut self, kind: CellKind, nodes: &[i64]) -> bool {
+    pub(super) fn add(&mut self, kind: CellKind, nodes: &[i64]) -> bool {
         self.cells += 1;
         match (kind, nodes) {
             (CellKind::Tetrahedron { order }, &[a, b, c, d, ..]) => {
@@ -79,12 +79,12 @@ impl CellSoup {
     }
 
     /// Number of cells so far, used or not.
-    pub fn count(&self) -> u32 {
+    pub(super) fn count(&self) -> u32 {
         self.cells
     }
 
     /// Adds values of cells; those of an array that is known already are joined to it.
-    pub fn label(&mut self, labels: Labels) {
+    pub(super) fn label(&mut self, labels: Labels) {
         match self.labels.iter_mut().find(|known| known.array == labels.array) {
             Some(known) => known.values.extend(labels.values),
             None => self.labels.push(labels),
@@ -92,19 +92,19 @@ impl CellSoup {
     }
 
     /// Shifts the node indices of everything added since `mark` by `first_node`, for files in several pieces.
-    pub fn shift_since(&mut self, mark: (usize, usize), first_node: i64) {
+    pub(super) fn shift_since(&mut self, mark: (usize, usize), first_node: i64) {
         self.tets[mark.0..].iter_mut().flatten().for_each(|n| *n += first_node);
         self.triangles[mark.1..].iter_mut().flatten().for_each(|n| *n += first_node);
     }
 
     /// Numbers of tetrahedra and triangles so far.
-    pub fn mark(&self) -> (usize, usize) {
+    pub(super) fn mark(&self) -> (usize, usize) {
         (self.tets.len(), self.triangles.len())
     }
 
     /// Maps the file's node tags to indices with `index_of` and makes the mesh: a volume if there is any
     /// tetrahedron, otherwise a surface.
-    pub fn finish(
+    pub(super) fn finish(
         self,
         file: &str,
         nodes: Vec<Vector3<f64>>,
@@ -146,7 +146,7 @@ impl CellSoup {
 }
 
 /// Index lookup for a file that counts its nodes from zero.
-pub fn zero_based(n_nodes: usize) -> impl Fn(i64) -> Option<u32> {
+pub(super) fn zero_based(n_nodes: usize) -> impl Fn(i64) -> Option<u32> {
     move |node| u32::try_from(node).ok().filter(|&n| (n as usize) < n_nodes)
 }
 

@@ -14,7 +14,7 @@ use super::mesh_file::MeshFile;
 use super::scanner::{ByteOrder, Encoding, Scanner};
 
 /// Reads a Gmsh file of any of the three formats.
-pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
+pub(super) fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let mut scanner = Scanner::new(file, bytes);
     let mut content = Content::default();
     let mut format = Format { version: Version::V1, encoding: Encoding::Text, size_width: 8 };

@@ -8,7 +8,7 @@ use serde::Serialize;
 pub const GMSH_PHYSICAL: &str = "gmsh:physical";
 
 /// A cell array with more different values numbers its cells rather than naming groups of them.
-pub const MOST_GROUPS: usize = 256;
+pub(super) const MOST_GROUPS: usize = 256;
 
 /// Tetrahedra that a file puts into one group.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -31,7 +31,7 @@ fn count<S: serde::Serializer>(tets: &[u32], serializer: S) -> Result<S::Ok, S::
 
 /// The values of a cell array, by the cell of the file.
 #[derive(Clone, Debug, Default)]
-pub struct Labels {
+pub(super) struct Labels {
     /// Name of the array.
     pub array: String,
     /// Cell and value; a cell may have several.
@@ -43,7 +43,7 @@ pub struct Labels {
 impl Labels {
     /// The values of an array with one value per cell, of which the first has number `first_cell`. `None` if one of
     /// them is no integer.
-    pub fn of_reals(array: &str, first_cell: u32, values: &[f64]) -> Option<Self> {
+    pub(super) fn of_reals(array: &str, first_cell: u32, values: &[f64]) -> Option<Self> {
         let whole = |value: &f64| value.fract() == 0.0 && value.abs() < 1e15;
         values.iter().all(whole).then(|| {
             let values = values.iter().map(|&value| value as i64);
@@ -53,7 +53,7 @@ impl Labels {
 
     /// The groups of tetrahedra with the same value. `cell_of_tet` is the file's cell of every tetrahedron, ascending.
     /// Empty if there are more than [`MOST_GROUPS`].
-    pub fn groups(self, cell_of_tet: &[u32]) -> Vec<CellGroup> {
+    pub(super) fn groups(self, cell_of_tet: &[u32]) -> Vec<CellGroup> {
         let mut groups: BTreeMap<i64, Vec<u32>> = BTreeMap::new();
         for &(cell, number) in &self.values {
             let Ok(tet) = cell_of_tet.binary_search(&cell) else { continue };

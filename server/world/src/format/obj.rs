@@ -14,7 +14,7 @@ use super::scanner::Scanner;
 const LINES: &str = "a line of an OBJ file (v, vn, vt, f, g, o, …)";
 
 /// Reads the positions and faces of all objects and groups in the file. Materials are ignored.
-pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
+pub(super) fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let models = models(file, bytes, &without(&["vn", "vt"], bytes))?;
     let Gathered { vertices, cells, .. } = gather(&models);
     let n = vertices.len();

@@ -64,7 +64,7 @@ fn integers(property: Property) -> Option<Vec<i64>> {
 }
 
 /// Reads the elements `vertex` (x, y, z) and `face` (vertex_indices) or `tristrips`.
-pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
+pub(super) fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let fault = |place: &str, found: String| MeshInError::Syntax {
         file: file.into(),
         place: place.into(),

@@ -7,11 +7,11 @@
 use super::error::MeshInError;
 
 /// Largest number of nodes or elements accepted from a file (indices are `u32`).
-pub const MAX_ITEMS: u64 = 200_000_000;
+pub(super) const MAX_ITEMS: u64 = 200_000_000;
 
 /// Byte order of binary numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ByteOrder {
+pub(super) enum ByteOrder {
     /// Least significant byte first.
     Little,
     /// Most significant byte first.
@@ -20,7 +20,7 @@ pub enum ByteOrder {
 
 /// How the numbers of a section are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encoding {
+pub(super) enum Encoding {
     /// Words separated by white space.
     Text,
     /// Fixed-width binary.
@@ -29,7 +29,7 @@ pub enum Encoding {
 
 /// A position in the bytes of a named file.
 #[derive(Clone)]
-pub struct Scanner<'a> {
+pub(super) struct Scanner<'a> {
     file: &'a str,
     bytes: &'a [u8],
     position: usize,
@@ -37,28 +37,28 @@ pub struct Scanner<'a> {
 
 impl<'a> Scanner<'a> {
     /// Starts at the first byte; `file` is the name used in errors.
-    pub fn new(file: &'a str, bytes: &'a [u8]) -> Self {
+    pub(super) fn new(file: &'a str, bytes: &'a [u8]) -> Self {
         Scanner { file, bytes, position: 0 }
     }
 
     /// Name of the file, for errors.
-    pub fn file(&self) -> &'a str {
+    pub(super) fn file(&self) -> &'a str {
         self.file
     }
 
     /// Bytes not read yet.
-    pub fn remaining(&self) -> usize {
+    pub(super) fn remaining(&self) -> usize {
         self.bytes.len() - self.position
     }
 
     /// "line 12 (byte 345)" for the next byte.
-    pub fn place(&self) -> String {
+    pub(super) fn place(&self) -> String {
         let newlines = self.bytes[..self.position].iter().filter(|&&b| b == b'\n').count();
         format!("line {} (byte {})", newlines + 1, self.position)
     }
 
     /// The error "expected … here", with a quotation of what is found.
-    pub fn expected(&self, expected: impl Into<String>) -> MeshInError {
+    pub(super) fn expected(&self, expected: impl Into<String>) -> MeshInError {
         let rest = &self.bytes[self.position..];
         let start = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
         let rest = &rest[start..];
@@ -73,7 +73,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// The error "this feature is not supported here".
-    pub fn unsupported(&self, what: impl Into<String>, instead: impl Into<String>) -> MeshInError {
+    pub(super) fn unsupported(&self, what: impl Into<String>, instead: impl Into<String>) -> MeshInError {
         MeshInError::Unsupported {
             file: self.file.into(),
             place: self.place(),
@@ -89,13 +89,13 @@ impl<'a> Scanner<'a> {
     }
 
     /// Skips white space and returns whether the end is reached.
-    pub fn at_end(&mut self) -> bool {
+    pub(super) fn at_end(&mut self) -> bool {
         self.skip_white();
         self.position == self.bytes.len()
     }
 
     /// The next word, without moving past it; empty at the end.
-    pub fn peek_word(&mut self) -> &'a str {
+    pub(super) fn peek_word(&mut self) -> &'a str {
         self.skip_white();
         let rest = &self.bytes[self.position..];
         let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
@@ -103,7 +103,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// The next word.
-    pub fn word(&mut self, expected: &str) -> Result<&'a str, MeshInError> {
+    pub(super) fn word(&mut self, expected: &str) -> Result<&'a str, MeshInError> {
         let word = self.peek_word();
         if word.is_empty() || word == "\u{fffd}" {
             return Err(self.expected(expected));
@@ -113,7 +113,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// The rest of the current line. Moves to the next line.
-    pub fn line(&mut self) -> &'a [u8] {
+    pub(super) fn line(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.position..];
         let length = rest.iter().position(|b| *b == b'\n').unwrap_or(rest.len());
         self.position += (length + 1).min(rest.len());
@@ -122,7 +122,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// Moves just behind the next occurrence of `marker`. Returns `false`, without moving, if there is none.
-    pub fn skip_past(&mut self, marker: &[u8]) -> bool {
+    pub(super) fn skip_past(&mut self, marker: &[u8]) -> bool {
         let rest = &self.bytes[self.position..];
         match rest.windows(marker.len().max(1)).position(|w| w == marker) {
             Some(start) => {
@@ -141,7 +141,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// The next `n` raw bytes.
-    pub fn take(&mut self, n: usize, what: &str) -> Result<&'a [u8], MeshInError> {
+    pub(super) fn take(&mut self, n: usize, what: &str) -> Result<&'a [u8], MeshInError> {
         if n > self.remaining() {
             return Err(MeshInError::Syntax {
                 file: self.file.into(),
@@ -156,24 +156,24 @@ impl<'a> Scanner<'a> {
     }
 
     /// The next word as an integer.
-    pub fn integer(&mut self, expected: &str) -> Result<i64, MeshInError> {
+    pub(super) fn integer(&mut self, expected: &str) -> Result<i64, MeshInError> {
         self.parsed(expected)
     }
 
     /// The next word as a real number. Fortran-style `1d-3` is not supported.
-    pub fn real(&mut self, expected: &str) -> Result<f64, MeshInError> {
+    pub(super) fn real(&mut self, expected: &str) -> Result<f64, MeshInError> {
         self.parsed(expected)
     }
 
     /// The next word as a count of `what`, each of which takes at least `bytes_each` of the remaining bytes.
-    pub fn count(&mut self, what: &str, bytes_each: usize) -> Result<usize, MeshInError> {
+    pub(super) fn count(&mut self, what: &str, bytes_each: usize) -> Result<usize, MeshInError> {
         let start = self.clone();
         let value: u64 = self.parsed(&format!("the number of {what}"))?;
         start.bounded(value, what, bytes_each)
     }
 
     /// Checks a count that was read in another way.
-    pub fn bounded(&self, value: u64, what: &str, bytes_each: usize) -> Result<usize, MeshInError> {
+    pub(super) fn bounded(&self, value: u64, what: &str, bytes_each: usize) -> Result<usize, MeshInError> {
         let by_size = (self.remaining() / bytes_each.max(1)) as u64;
         let limit = by_size.min(MAX_ITEMS);
         if value > limit {
@@ -194,7 +194,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// An integer of `width` bytes (1, 4 or 8), or the next word in a text section.
-    pub fn stored_integer(
+    pub(super) fn stored_integer(
         &mut self,
         encoding: Encoding,
         width: usize,
@@ -211,7 +211,12 @@ impl<'a> Scanner<'a> {
     }
 
     /// A real number of `width` bytes (4 or 8), or the next word in a text section.
-    pub fn stored_real(&mut self, encoding: Encoding, width: usize, what: &str) -> Result<f64, MeshInError> {
+    pub(super) fn stored_real(
+        &mut self,
+        encoding: Encoding,
+        width: usize,
+        what: &str,
+    ) -> Result<f64, MeshInError> {
         match encoding {
             Encoding::Text => self.real(what),
             Encoding::Binary(order) => {
@@ -224,7 +229,7 @@ impl<'a> Scanner<'a> {
 }
 
 /// A signed binary integer of 1 (unsigned), 2, 4 or 8 bytes; `None` for other widths.
-pub fn binary_integer(bytes: &[u8], order: ByteOrder) -> Option<i64> {
+pub(super) fn binary_integer(bytes: &[u8], order: ByteOrder) -> Option<i64> {
     use ByteOrder::{Big, Little};
     Some(match (bytes, order) {
         ([b], _) => i64::from(*b),
@@ -239,7 +244,7 @@ pub fn binary_integer(bytes: &[u8], order: ByteOrder) -> Option<i64> {
 }
 
 /// A binary IEEE real of 4 or 8 bytes; `None` for other widths.
-pub fn binary_real(bytes: &[u8], order: ByteOrder) -> Option<f64> {
+pub(super) fn binary_real(bytes: &[u8], order: ByteOrder) -> Option<f64> {
     use ByteOrder::{Big, Little};
     Some(match (bytes, order) {
         (&[a, b, c, d], Little) => f64::from(f32::from_le_bytes([a, b, c, d])),

@@ -13,7 +13,7 @@ const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
 /// Reads all facets. Their normals are ignored; users recompute them from the corners.
-pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
+pub(super) fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let binary_count = binary_count(bytes);
     let fault = |number: usize, expected: &str, found: String| MeshInError::Syntax {
         file: file.into(),

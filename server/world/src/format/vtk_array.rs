@@ -12,7 +12,7 @@ use super::scanner::{ByteOrder, binary_integer, binary_real};
 const MAX_ARRAY_BYTES: u64 = 2 << 30;
 
 /// How a file stores its binary arrays.
-pub struct Storage<'a> {
+pub(super) struct Storage<'a> {
     /// Byte order of headers and data.
     pub order: ByteOrder,
     /// Width of header integers [bytes].
@@ -24,7 +24,7 @@ pub struct Storage<'a> {
 }
 
 /// A `<DataArray>` as found in the XML, not decoded.
-pub struct DataArray {
+pub(super) struct DataArray {
     /// "Float32", "Int64", …
     pub type_name: String,
     /// "ascii", "binary" or "appended".
@@ -38,7 +38,7 @@ pub struct DataArray {
 }
 
 /// Decoded values.
-pub enum Array {
+pub(super) enum Array {
     /// Values of an integer type.
     Integers(Vec<i64>),
     /// Values of a real type.
@@ -47,7 +47,7 @@ pub enum Array {
 
 impl Array {
     /// Values as reals.
-    pub fn into_reals(self) -> Vec<f64> {
+    pub(super) fn into_reals(self) -> Vec<f64> {
         match self {
             Array::Integers(values) => values.into_iter().map(|v| v as f64).collect(),
             Array::Reals(values) => values,
@@ -57,7 +57,7 @@ impl Array {
 
 impl Storage<'_> {
     /// Decodes one array. The error describes the fault.
-    pub fn decode(&self, array: &DataArray) -> Result<Array, String> {
+    pub(super) fn decode(&self, array: &DataArray) -> Result<Array, String> {
         let (is_real, width) = match array.type_name.as_str() {
             "Float32" => (true, 4),
             "Float64" => (true, 8),

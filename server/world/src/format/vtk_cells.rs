@@ -7,7 +7,7 @@ use super::cells::{CellKind, CellSoup};
 use super::error::MeshInError;
 
 /// The contribution of a VTK cell type to a mesh.
-pub fn kind(vtk_type: i64) -> CellKind {
+pub(super) fn kind(vtk_type: i64) -> CellKind {
     use CellKind::{Ignored, Pixel, Polygon, Quad, Refused, Strip, Tetrahedron, Triangle};
     match vtk_type {
         0..=2 => Ignored("point"),
@@ -29,7 +29,7 @@ pub fn kind(vtk_type: i64) -> CellKind {
 }
 
 /// Adds a cell. `place` is called only for an error.
-pub fn add(
+pub(super) fn add(
     cells: &mut CellSoup,
     file: &str,
     vtk_type: i64,

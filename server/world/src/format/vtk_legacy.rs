@@ -14,7 +14,7 @@ use super::vtk_cells;
 use super::vtk_legacy_data::{data, skip_metadata, width_of};
 
 /// Reads a legacy VTK file. Of its data only cell arrays of one whole number per cell are used.
-pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
+pub(super) fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let mut scanner = Scanner::new(file, bytes);
     let at = scanner.clone();
     if !scanner.line().starts_with(b"# vtk DataFile Version") {
@@ -240,7 +240,7 @@ impl Content {
 }
 
 /// Offsets as indices, if they ascend and stay within `n_entries`.
-pub fn monotone_offsets(raw: Vec<i64>, n_entries: usize) -> Option<Vec<usize>> {
+pub(super) fn monotone_offsets(raw: Vec<i64>, n_entries: usize) -> Option<Vec<usize>> {
     let offsets: Vec<usize> = raw.into_iter().map(usize::try_from).collect::<Result<_, _>>().ok()?;
     let rising = offsets.windows(2).all(|w| w[0] <= w[1]);
     (rising && offsets.last().is_none_or(|&end| end <= n_entries)).then_some(offsets)

@@ -8,7 +8,7 @@ use super::groups::Labels;
 use super::scanner::{Encoding, Scanner};
 
 /// The cell arrays that follow in `scanner`, as far as they can be read.
-pub fn data(scanner: Scanner<'_>, encoding: Encoding) -> Vec<Labels> {
+pub(super) fn data(scanner: Scanner<'_>, encoding: Encoding) -> Vec<Labels> {
     let mut reader = Reader { scanner, encoding, of_cells: false, n: 0, found: Vec::new() };
     while let Ok(true) = reader.next() {}
     reader.found
@@ -136,7 +136,7 @@ impl Reader<'_> {
 }
 
 /// Bytes of a value of a type of the format.
-pub fn width_of(type_name: &str) -> Option<usize> {
+pub(super) fn width_of(type_name: &str) -> Option<usize> {
     Some(match type_name {
         "char" | "unsigned_char" => 1,
         "short" | "unsigned_short" => 2,
@@ -147,7 +147,7 @@ pub fn width_of(type_name: &str) -> Option<usize> {
 }
 
 /// METADATA ends at the first blank line after its keyword line.
-pub fn skip_metadata(scanner: &mut Scanner) {
+pub(super) fn skip_metadata(scanner: &mut Scanner) {
     scanner.line();
     while !scanner.line().is_empty() && scanner.remaining() > 0 {}
 }

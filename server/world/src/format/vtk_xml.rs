@@ -20,7 +20,7 @@ use super::vtk_cells;
 use super::vtk_legacy::monotone_offsets;
 
 /// Reads a `.vtu` or `.vtp` file. Of its data only cell arrays of one whole number per cell are used.
-pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
+pub(super) fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let document = Document::parse(file, bytes)?;
     let mut points: Vec<Vector3<f64>> = Vec::new();
     let mut cells = CellSoup::default();

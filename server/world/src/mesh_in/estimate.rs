@@ -57,12 +57,12 @@ pub fn largest(size_m: [f64; 3], volume_m3: f64, bytes: f64) -> usize {
 }
 
 /// Most cells that a user may request.
-pub fn most_cells() -> usize {
+pub(crate) fn most_cells() -> usize {
     *CELLS.end()
 }
 
 /// Memory [bytes] of a body of `tets` tetrahedra.
-pub fn body_bytes(tets: f64) -> f64 {
+pub(crate) fn body_bytes(tets: f64) -> f64 {
     tets * BYTES_PER_TET
 }
 

@@ -20,7 +20,7 @@ const BISECTIONS: usize = 30;
 /// Triangulates the zero set of `f` within a box, on a grid of cubes of side `spacing` [m].
 ///
 /// The surface is closed if `f` is positive on the border of the box. Vertices lie on the zero set.
-pub fn triangulate(
+pub(super) fn triangulate(
     name: &str,
     f: &dyn Fn(&Vector3<f64>) -> f64,
     low: Vector3<f64>,

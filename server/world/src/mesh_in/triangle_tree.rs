@@ -14,7 +14,7 @@ const FAR: f64 = 2.3;
 const EDGE_SLACK: f64 = 1e-9;
 
 /// Boxes, dipoles and triangles. The children of node `i` are `first` and `first + 1`.
-pub struct TriangleTree {
+pub(crate) struct TriangleTree {
     nodes: Vec<Node>,
     corners: Vec<[Vector3<f64>; 3]>,
     /// Number of each stored triangle in the list from which the tree was built.
@@ -37,7 +37,7 @@ struct Node {
 
 impl TriangleTree {
     /// Builds the tree by median splits along the longest side.
-    pub fn new(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Self {
+    pub(crate) fn new(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Self {
         let corners: Vec<[Vector3<f64>; 3]> =
             triangles.iter().map(|t| t.map(|v| vertices[v as usize])).collect();
         let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
@@ -53,12 +53,12 @@ impl TriangleTree {
     }
 
     /// Corners of all triangles [m], in the order of the tree.
-    pub fn triangles(&self) -> &[[Vector3<f64>; 3]] {
+    pub(crate) fn triangles(&self) -> &[[Vector3<f64>; 3]] {
         &self.corners
     }
 
     /// Unit normals of all triangles, by their numbers in the list from which the tree was built.
-    pub fn normals(&self) -> Vec<Vector3<f64>> {
+    pub(crate) fn normals(&self) -> Vec<Vector3<f64>> {
         let mut normals = vec![Vector3::zeros(); self.source.len()];
         for ([a, b, c], &number) in self.corners.iter().zip(&self.source) {
             normals[number as usize] = (b - a).cross(&(c - a)).normalize();
@@ -96,7 +96,7 @@ impl TriangleTree {
 
     /// Parameters t in [0, 1] where the segment `a + t (b − a)` meets triangles, ascending, each with the
     /// number of its triangle.
-    pub fn crossings(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Vec<(f64, u32)> {
+    pub(crate) fn crossings(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Vec<(f64, u32)> {
         let mut hits = Vec::new();
         let mut stack = vec![0u32];
         while let Some(node) = stack.pop().and_then(|i| self.nodes.get(i as usize)) {
@@ -119,7 +119,7 @@ impl TriangleTree {
 
     /// Generalised winding number at `q`: 1 inside and 0 outside a closed, outward oriented surface, values
     /// in between near holes.
-    pub fn winding_number(&self, q: &Vector3<f64>) -> f64 {
+    pub(crate) fn winding_number(&self, q: &Vector3<f64>) -> f64 {
         let mut sum = 0.0;
         let mut stack = [0u32; 64];
         let mut depth = usize::from(!self.nodes.is_empty());

@@ -83,7 +83,7 @@ pub fn write_fields(
 ///
 /// # Errors
 /// What the disk says, and of which file.
-pub fn write_blocks(
+pub(super) fn write_blocks(
     directory: &Path,
     name: &str,
     simulation: &Simulation,

@@ -11,7 +11,7 @@ use crate::simulation::Simulation;
 
 /// Writes `contacts.csv`, if the scene has anything that may touch.
 #[derive(Debug)]
-pub struct Forces {
+pub(super) struct Forces {
     path: PathBuf,
     file: csv::Writer<BufWriter<File>>,
 }
@@ -78,7 +78,7 @@ impl Forces {
     ///
     /// # Errors
     /// What the disk says.
-    pub fn begin(directory: &Path, simulation: &Simulation) -> Result<Option<Self>, ResultsError> {
+    pub(super) fn begin(directory: &Path, simulation: &Simulation) -> Result<Option<Self>, ResultsError> {
         let plan = simulation.plan();
         let touches = plan.effects.iter().any(|effect| {
             let name = effect.name.as_str();
@@ -112,7 +112,7 @@ impl Forces {
     ///
     /// # Errors
     /// What the disk says.
-    pub fn record(&mut self, simulation: &Simulation) -> Result<(), ResultsError> {
+    pub(super) fn record(&mut self, simulation: &Simulation) -> Result<(), ResultsError> {
         each_contact(simulation, |row| self.write(simulation, row))
     }
 
@@ -120,7 +120,7 @@ impl Forces {
     ///
     /// # Errors
     /// What the disk says.
-    pub fn flush(&mut self) -> Result<(), ResultsError> {
+    pub(super) fn flush(&mut self) -> Result<(), ResultsError> {
         self.file.flush().map_err(at(&self.path))
     }
 

@@ -11,7 +11,7 @@ use crate::simulation::Simulation;
 
 /// Writes `reactions.csv`, if displacements or loads of the scene change over time.
 #[derive(Debug)]
-pub struct Reactions {
+pub(super) struct Reactions {
     path: PathBuf,
     file: csv::Writer<BufWriter<File>>,
 }
@@ -21,7 +21,7 @@ impl Reactions {
     ///
     /// # Errors
     /// What the disk says.
-    pub fn begin(directory: &Path, simulation: &Simulation) -> Result<Option<Self>, ResultsError> {
+    pub(super) fn begin(directory: &Path, simulation: &Simulation) -> Result<Option<Self>, ResultsError> {
         if !simulation.bodies().iter().any(|body| body.settled_s() > 0.0) {
             return Ok(None);
         }
@@ -37,7 +37,7 @@ impl Reactions {
     ///
     /// # Errors
     /// What the disk says.
-    pub fn record(&mut self, simulation: &Simulation) -> Result<(), ResultsError> {
+    pub(super) fn record(&mut self, simulation: &Simulation) -> Result<(), ResultsError> {
         let when = (simulation.steps(), simulation.time_s());
         // The step that reaches the end of a table may end an instant after it.
         let changed = |body: &&SimBody| when.1 < body.settled_s() + simulation.scene().step_s;
@@ -56,7 +56,7 @@ impl Reactions {
     ///
     /// # Errors
     /// What the disk says.
-    pub fn flush(&mut self) -> Result<(), ResultsError> {
+    pub(super) fn flush(&mut self) -> Result<(), ResultsError> {
         self.file.flush().map_err(at(&self.path))
     }
 }

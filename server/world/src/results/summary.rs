@@ -307,7 +307,7 @@ pub(crate) struct Running {
 
 impl Running {
     /// Takes note of the step that `simulation` has just made.
-    pub fn add(&mut self, simulation: &Simulation) {
+    pub(super) fn add(&mut self, simulation: &Simulation) {
         self.add_report(simulation.report());
         self.processor_s += simulation.report().processor_s;
         self.largest_displacement_m.resize(simulation.bodies().len(), 0.0);
@@ -360,7 +360,7 @@ impl Running {
         self.events.extend(report.events.iter().take(room).map(|event| event_summary(report.step, event)));
     }
 
-    pub fn summary(&self, simulation: &Simulation, scene: Value, status: &str) -> Summary {
+    pub(super) fn summary(&self, simulation: &Simulation, scene: Value, status: &str) -> Summary {
         let checked = simulation.scene();
         let steps = self.step_ms.len();
         let body = |(i, body): (usize, &SimBody)| {

@@ -32,7 +32,7 @@ pub(crate) struct Unreadable {
 
 impl Node {
     /// The tree of a TOML text.
-    pub fn from_toml(text: &str) -> Result<Node, Unreadable> {
+    pub(super) fn from_toml(text: &str) -> Result<Node, Unreadable> {
         let lines = Lines::of(text);
         let table = DeTable::parse(text).map_err(|error| Unreadable {
             line: error.span().map(|span| lines.at(span.start)),
@@ -42,14 +42,14 @@ impl Node {
     }
 
     /// The tree of a JSON text; lines are not known.
-    pub fn from_json(text: &str) -> Result<Node, Unreadable> {
+    pub(super) fn from_json(text: &str) -> Result<Node, Unreadable> {
         let value: Value = serde_json::from_str(text)
             .map_err(|error| Unreadable { line: Some(error.line()), message: error.to_string() })?;
         Ok(json_node(&value))
     }
 
     /// The tree as JSON. Non-finite numbers, which JSON cannot hold, become null.
-    pub fn to_json(&self) -> Value {
+    pub(super) fn to_json(&self) -> Value {
         match &self.kind {
             Kind::Null => Value::Null,
             Kind::Bool(value) => Value::Bool(*value),
@@ -64,7 +64,7 @@ impl Node {
     }
 
     /// The value as it would stand in a message.
-    pub fn shown(&self) -> String {
+    pub(super) fn shown(&self) -> String {
         let text = match &self.kind {
             Kind::Null => "nothing".to_owned(),
             Kind::Float(value) if !value.is_finite() => value.to_string(),
@@ -75,7 +75,7 @@ impl Node {
     }
 
     /// The member of a table.
-    pub fn get(&self, key: &str) -> Option<&Node> {
+    pub(super) fn get(&self, key: &str) -> Option<&Node> {
         match &self.kind {
             Kind::Table(entries) => entries.iter().find(|(k, _)| k == key).map(|(_, v)| v),
             Kind::Array(items) => position(items, key).map(|i| &items[i]),
@@ -84,7 +84,7 @@ impl Node {
     }
 
     /// The line of a key path, or of the deepest part of it that exists.
-    pub fn line_of(&self, path: &str) -> Option<usize> {
+    pub(super) fn line_of(&self, path: &str) -> Option<usize> {
         let mut node = self;
         let mut line = self.line;
         for segment in path.split('.').filter(|s| !s.is_empty()) {
@@ -99,7 +99,7 @@ impl Node {
 
     /// Overrides one value: `body.beam.young_pa=3e4`. Tables that are missing are made; members
     /// of an array of tables go by `id` or index and must exist.
-    pub fn set(&mut self, assignment: &str) -> Result<(), Unreadable> {
+    pub(super) fn set(&mut self, assignment: &str) -> Result<(), Unreadable> {
         let fail = |message: String| Unreadable { line: None, message };
         let (path, text) = assignment.split_once('=').ok_or_else(|| {
             fail(format!("`{assignment}` has no `=`; write key=value, for example world.step_s=0.01"))

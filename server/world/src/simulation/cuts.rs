@@ -109,7 +109,7 @@ struct RequestEnd {
 }
 
 impl Cuts {
-    pub fn new(cuts: &[CutSpec], bodies: &[SimBody]) -> Self {
+    pub(super) fn new(cuts: &[CutSpec], bodies: &[SimBody]) -> Self {
         let mut schedule: Vec<Scheduled> = cuts
             .iter()
             .map(|cut| Scheduled { at_s: cut.at_s, body: cut.body, blade: cut.blade.clone() })
@@ -121,7 +121,7 @@ impl Cuts {
     }
 
     /// Back to the start of the schedule.
-    pub fn reset(&mut self) {
+    pub(super) fn reset(&mut self) {
         self.next = 0;
         self.ends.clear();
         self.history.clear();
@@ -130,7 +130,7 @@ impl Cuts {
     }
 
     /// What the scheduled cuts so far were to open, where the error is estimated.
-    pub fn swept(&self) -> &[Swept] {
+    pub(super) fn swept(&self) -> &[Swept] {
         &self.swept
     }
 
@@ -138,7 +138,7 @@ impl Cuts {
     ///
     /// # Errors
     /// That there is none, that cuts still wait, or that a body cannot be built again.
-    pub fn undo(&mut self, bodies: &mut [SimBody]) -> Result<Undone, String> {
+    pub(super) fn undo(&mut self, bodies: &mut [SimBody]) -> Result<Undone, String> {
         if !self.waiting.is_empty() {
             return Err("cuts are still being made; undo the last one when they are complete".into());
         }
@@ -149,18 +149,18 @@ impl Cuts {
     }
 
     /// Forgets the cuts that wait, for a reset or the end; their outcomes say `reason`.
-    pub fn discard(&mut self, reason: &str) -> Vec<CutOutcome> {
+    pub(super) fn discard(&mut self, reason: &str) -> Vec<CutOutcome> {
         let discarded = self.waiting.drain(..).filter_map(|job| job.request);
         discarded.map(|request| CutOutcome { request, result: Err(reason.to_owned()) }).collect()
     }
 
     /// Sweeps that changed a body so far.
-    pub fn applied(&self) -> u64 {
+    pub(super) fn applied(&self) -> u64 {
         self.applied
     }
 
     /// Cuts that the schedule has for the time up to `time_s` [s].
-    pub fn apply_schedule(&mut self, time_s: f64, at: &mut CutContext<'_>) {
+    pub(super) fn apply_schedule(&mut self, time_s: f64, at: &mut CutContext<'_>) {
         while let Some(due) = self.schedule.get(self.next).filter(|cut| cut.at_s <= time_s) {
             if at.bodies[due.body].body.is_being_cut() {
                 return;
@@ -186,7 +186,7 @@ impl Cuts {
     }
 
     /// Queues cuts that clients asked for; each gets an outcome, in this step or a later one.
-    pub fn queue_requests(&mut self, requests: &[CutRequest], at: &mut CutContext<'_>) {
+    pub(super) fn queue_requests(&mut self, requests: &[CutRequest], at: &mut CutContext<'_>) {
         for request in requests {
             match self.job_of(request, at) {
                 Ok(job) => self.waiting.push_back(job),
@@ -198,7 +198,7 @@ impl Cuts {
     }
 
     /// Queues cuts that blades made by moving, through every body they meet.
-    pub fn queue_blades(&mut self, at: &mut CutContext<'_>) {
+    pub(super) fn queue_blades(&mut self, at: &mut CutContext<'_>) {
         for tool in 0..at.tools.len() {
             let Some((blade, incision)) = at.tools.take_sweep(tool, self.least_move_m) else { continue };
             if let Some(job) = self.waiting.iter_mut().rfind(|job| job.incision == incision)
@@ -217,7 +217,7 @@ impl Cuts {
     }
 
     /// Makes queued cuts, in order, as far as the work of one step goes.
-    pub fn work_off(&mut self, at: &mut CutContext<'_>) {
+    pub(super) fn work_off(&mut self, at: &mut CutContext<'_>) {
         let mut work = Work::new(WORK_PER_STEP);
         while let Some(mut job) = self.waiting.pop_front() {
             let Some(result) = self.go_on(&mut job, &mut work, at) else {

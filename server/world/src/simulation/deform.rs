@@ -66,7 +66,7 @@ impl Simulation {
 
 impl Groups {
     /// Forces of the pair springs of the last step that the group whose first body is `first` made together [N].
-    pub fn forces_of(&self, first: usize) -> &[Vector3<f64>] {
+    pub(super) fn forces_of(&self, first: usize) -> &[Vector3<f64>] {
         self.0.get(first).map(Group::forces).unwrap_or_default()
     }
 

@@ -26,36 +26,36 @@ pub(crate) struct Dormant {
 
 impl Dormant {
     /// All bodies awake; `allowed` tells whether they may sleep.
-    pub fn new(bodies: usize, allowed: bool) -> Self {
+    pub(super) fn new(bodies: usize, allowed: bool) -> Self {
         let bodies = if allowed { bodies } else { 0 };
         Self { asleep: vec![false; bodies], quiet_s: vec![0.0; bodies], epochs: vec![0; bodies] }
     }
 
     /// Per body whether it sleeps; empty if the scene lets none sleep.
-    pub fn asleep(&self) -> &[bool] {
+    pub(super) fn asleep(&self) -> &[bool] {
         &self.asleep
     }
 
     /// Whether body number `i` sleeps.
-    pub fn is_asleep(&self, i: usize) -> bool {
+    pub(super) fn is_asleep(&self, i: usize) -> bool {
         self.asleep.get(i).copied().unwrap_or(false)
     }
 
     /// Wakes all bodies.
-    pub fn wake_all(&mut self) {
+    pub(super) fn wake_all(&mut self) {
         self.asleep.fill(false);
         self.quiet_s.fill(0.0);
     }
 
     /// Wakes body number `i`.
-    pub fn wake(&mut self, i: usize) {
+    pub(super) fn wake(&mut self, i: usize) {
         if let (Some(asleep), Some(quiet_s)) = (self.asleep.get_mut(i), self.quiet_s.get_mut(i)) {
             (*asleep, *quiet_s) = (false, 0.0);
         }
     }
 
     /// Wakes the bodies that were cut, or otherwise changed, since the last call.
-    pub fn follow(&mut self, bodies: &[SimBody]) {
+    pub(super) fn follow(&mut self, bodies: &[SimBody]) {
         for (i, body) in bodies.iter().enumerate().take(self.asleep.len()) {
             if std::mem::replace(&mut self.epochs[i], body.epoch()) != body.epoch() {
                 self.wake(i);
@@ -64,7 +64,7 @@ impl Dormant {
     }
 
     /// Wakes the bodies that something acts on: tools, or bodies that are awake.
-    pub fn disturb(&mut self, contacts: &Contacts) {
+    pub(super) fn disturb(&mut self, contacts: &Contacts) {
         for i in 0..self.asleep.len() {
             if self.asleep[i] && !contacts.springs(i).is_empty() {
                 self.wake(i);
@@ -73,7 +73,7 @@ impl Dormant {
     }
 
     /// Wakes the bodies that stand in contact with others that are awake.
-    pub fn join(&mut self, contacts: &Contacts) {
+    pub(super) fn join(&mut self, contacts: &Contacts) {
         let group = |i: usize| contacts.pairs().group_of(i);
         for i in 0..self.asleep.len() {
             if self.asleep[i] && (0..self.asleep.len()).any(|k| !self.asleep[k] && group(k) == group(i)) {
@@ -83,7 +83,7 @@ impl Dormant {
     }
 
     /// Puts groups of bodies to sleep that have been quiet for long enough at the end of a step of `h` seconds.
-    pub fn settle(
+    pub(super) fn settle(
         &mut self,
         (time_s, h): (f64, f64),
         bodies: &[SimBody],

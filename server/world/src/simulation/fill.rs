@@ -23,7 +23,7 @@ pub(crate) struct Sources<'a> {
 
 impl Sources<'_> {
     /// Fills bodies, probes and tools of `out`: of the surfaces only what `wants` says.
-    pub fn fill(self, wants: &Wants, out: &mut Snapshot) {
+    pub(super) fn fill(self, wants: &Wants, out: &mut Snapshot) {
         out.bodies.resize_with(self.bodies.len(), BodySnapshot::default);
         for (i, (body, out)) in self.bodies.iter_mut().zip(&mut out.bodies).enumerate() {
             let asked = |flags: &[bool]| flags.get(i).copied().unwrap_or(false);

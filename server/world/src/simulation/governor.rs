@@ -93,27 +93,27 @@ pub(crate) struct Governor {
 }
 
 impl Governor {
-    pub fn new(on: bool) -> Self {
+    pub(crate) fn new(on: bool) -> Self {
         Self { on, patience: PATIENCE[0], ..Self::default() }
     }
 
     /// What it did so far; `None` if the scene has none.
-    pub fn report(&self) -> Option<GovernorReport> {
+    pub(crate) fn report(&self) -> Option<GovernorReport> {
         self.on.then_some(self.report)
     }
 
     /// Whether the estimate of the error is given up.
-    pub fn drops_estimate(&self) -> bool {
+    pub(crate) fn drops_estimate(&self) -> bool {
         LADDER[self.rung] != Rung::Whole
     }
 
     /// Takes note that the last step took `seconds`.
-    pub fn take(&mut self, seconds: f64) {
+    pub(crate) fn take(&mut self, seconds: f64) {
         self.last_s = Some(seconds).filter(|seconds| self.on && seconds.is_finite());
     }
 
     /// Decides by the last step how the next one is made. Returns what it tells people.
-    pub fn decide(&mut self, scene: &CheckedScene, bodies: &mut [SimBody]) -> Option<Event> {
+    pub(crate) fn decide(&mut self, scene: &CheckedScene, bodies: &mut [SimBody]) -> Option<Event> {
         let (seconds, budget_s) = (self.last_s.take()?, scene.step_s);
         self.count(seconds > budget_s);
         self.since += 1;
@@ -159,7 +159,7 @@ impl Governor {
     }
 
     /// Gives bodies the tolerances of the present rung, e.g. after the scene has changed.
-    pub fn apply(&self, scene: &CheckedScene, bodies: &mut [SimBody]) {
+    pub(crate) fn apply(&self, scene: &CheckedScene, bodies: &mut [SimBody]) {
         if !self.on {
             return;
         }

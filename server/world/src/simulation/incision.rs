@@ -15,7 +15,7 @@ const MAX_PLACES: usize = 16;
 ///
 /// # Errors
 /// Where the body has no surface.
-pub fn incision_along(
+pub(super) fn incision_along(
     body: &mut SimBody,
     points: &[Vector3<f64>],
     depth_m: f64,

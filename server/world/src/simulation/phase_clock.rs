@@ -30,12 +30,12 @@ struct UnderWay {
 
 impl PhaseClock {
     /// Whether the log asks for the spans of phases.
-    pub fn is_traced() -> bool {
+    pub(super) fn is_traced() -> bool {
         tracing::enabled!(Level::TRACE)
     }
 
     /// Begins or ends to measure `bodies`.
-    pub fn set<'a>(&mut self, on: bool, bodies: impl Iterator<Item = &'a mut Body>) {
+    pub(super) fn set<'a>(&mut self, on: bool, bodies: impl Iterator<Item = &'a mut Body>) {
         self.0.clear();
         for body in bodies {
             let mark = on.then(|| -> PhaseMark {
@@ -48,21 +48,21 @@ impl PhaseClock {
     }
 
     /// Called before the step of body `i`: forgets a phase that something else than a step announced.
-    pub fn start(&self, i: usize) {
+    pub(super) fn start(&self, i: usize) {
         if let Some(times) = self.0.get(i) {
             lock(times).under_way = None;
         }
     }
 
     /// Called after the step of body `i`: ends its last phase.
-    pub fn end(&self, i: usize) {
+    pub(super) fn end(&self, i: usize) {
         if let Some(times) = self.0.get(i) {
             lock(times).end();
         }
     }
 
     /// Returns the times since the last call, of all bodies together.
-    pub fn take(&self) -> PhaseSeconds {
+    pub(super) fn take(&self) -> PhaseSeconds {
         let mut sum = PhaseSeconds::default();
         for times in &self.0 {
             sum.add(&std::mem::take(&mut lock(times).seconds));

@@ -21,7 +21,7 @@ pub(crate) struct Sleep {
 }
 
 impl Sleep {
-    pub fn new(bodies: &[SimBody]) -> Self {
+    pub(super) fn new(bodies: &[SimBody]) -> Self {
         let held = bodies.iter().any(|body| !body.body.fixed_nodes().is_empty());
         let mut points = bodies.iter().flat_map(|body| body.body.rest_positions());
         let first = points.next().copied().filter(|_| held);
@@ -31,7 +31,7 @@ impl Sleep {
     }
 
     /// Puts parts to sleep that are far from the scene, and tells so.
-    pub fn look(&mut self, step: u64, bodies: &mut [SimBody], report: &mut StepReport) {
+    pub(super) fn look(&mut self, step: u64, bodies: &mut [SimBody], report: &mut StepReport) {
         let Some([low, high]) = self.scene.filter(|_| step.is_multiple_of(EVERY)) else { return };
         let far_m = FAR * (high - low).norm();
         for body in bodies.iter_mut().filter(|body| body.body.parts().any_free()) {

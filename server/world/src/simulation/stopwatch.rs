@@ -19,23 +19,23 @@ pub(crate) struct Stopwatch {
 }
 
 impl Stopwatch {
-    pub fn start() -> Self {
+    pub(super) fn start() -> Self {
         let processor_start_s = processor_seconds();
         Self { last: Instant::now(), seconds: StageSeconds::default(), processor_start_s }
     }
 
-    pub fn book(&mut self, stage: Stage) {
+    pub(super) fn book(&mut self, stage: Stage) {
         let now = Instant::now();
         self.seconds.book(stage, (now - self.last).as_secs_f64());
         self.last = now;
     }
 
-    pub fn seconds(&self) -> StageSeconds {
+    pub(super) fn seconds(&self) -> StageSeconds {
         self.seconds
     }
 
     /// Processor time of this thread since the start [s].
-    pub fn processor_s(&self) -> f64 {
+    pub(super) fn processor_s(&self) -> f64 {
         processor_seconds() - self.processor_start_s
     }
 }

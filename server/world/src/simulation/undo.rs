@@ -46,7 +46,7 @@ pub struct Undone {
 
 impl History {
     /// Keeps `body`, number `index`, if this is the first that `incision` comes near it.
-    pub fn before(&mut self, index: usize, body: &SimBody, blade: &BladeSweep, incision: u32) {
+    pub(super) fn before(&mut self, index: usize, body: &SimBody, blade: &BladeSweep, incision: u32) {
         let known = |kept: &Kept| kept.body == index && kept.incision == incision;
         if self.kept.iter().any(known) || !meets(body, blade) {
             return;
@@ -68,7 +68,7 @@ impl History {
     }
 
     /// Notes what a sweep of `incision` did to body number `index`, which had `epoch` before.
-    pub fn after(&mut self, index: usize, incision: u32, epoch: u32, done: &CutReport) {
+    pub(super) fn after(&mut self, index: usize, incision: u32, epoch: u32, done: &CutReport) {
         if done.epoch == epoch && done.pending_edges == 0 && done.elements_cut == 0 {
             return;
         }
@@ -80,7 +80,7 @@ impl History {
     ///
     /// # Errors
     /// That there is none, or that a body cannot be built again.
-    pub fn undo(&mut self, bodies: &mut [SimBody]) -> Result<Undone, String> {
+    pub(super) fn undo(&mut self, bodies: &mut [SimBody]) -> Result<Undone, String> {
         while self.kept.back().is_some_and(|kept| !kept.used) {
             self.kept.pop_back();
         }
@@ -109,7 +109,7 @@ impl History {
     }
 
     /// Nothing can be taken back any more.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         *self = Self::default();
     }
 }

@@ -10,15 +10,15 @@ use scindo_physics::solver::Method;
 
 use crate::support::{clamped, equilibrium_by, held};
 
-pub const DENSITY: f64 = 1070.0;
+pub(crate) const DENSITY: f64 = 1070.0;
 /// The cut lies at z = 0.1 m, x up to the front [m].
-pub const CUT_Z: f64 = 0.1;
-pub const FRONT_X: f64 = 0.015;
+pub(crate) const CUT_Z: f64 = 0.1;
+pub(crate) const FRONT_X: f64 = 0.015;
 /// The strip that is loaded in `tc2force` and `tc2strip`: z = 0.2 m, x up to this [m].
-pub const STRIP_X: f64 = 0.005;
+pub(crate) const STRIP_X: f64 = 0.005;
 
 /// Whether a rest position lies on the strip.
-pub fn on_strip(X: &Vector3<f64>) -> bool {
+pub(crate) fn on_strip(X: &Vector3<f64>) -> bool {
     X.z > 0.2 - 1e-9 && X.x < STRIP_X + 1e-9
 }
 
@@ -50,7 +50,7 @@ fn strip_areas(model: &Model) -> Vec<f64> {
 }
 
 /// Equilibrium of the half model in a case, its linear systems solved by `method`.
-pub fn solve(method: Method, model: &Model, case: &str) -> Vec<Vector3<f64>> {
+pub(crate) fn solve(method: Method, model: &Model, case: &str) -> Vec<Vector3<f64>> {
     let rest = model.rest();
     let mut fixed = clamped(model, |X| X.z < 1e-9);
     let middle = |n: &usize| rest[*n].y > 0.03 - 1e-9 && rest[*n].z > 1e-9;

@@ -13,20 +13,20 @@ use scindo_physics::mesh::{BoxPattern, box_mesh};
 use scindo_physics::solver::{LinearSettings, Method, NewtonSettings, Precision};
 use scindo_physics::team::Team;
 
-pub type V = Vector3<f64>;
+pub(crate) type V = Vector3<f64>;
 
-pub fn material(law: Law, young_pa: f64, poisson: f64, density_kg_m3: f64) -> Material {
+pub(crate) fn material(law: Law, young_pa: f64, poisson: f64, density_kg_m3: f64) -> Material {
     Material { young_pa, poisson, density_kg_m3, rayleigh: Rayleigh::default(), law }
 }
 
 /// A box of five-tet cells with its corner at the origin.
-pub fn tet_box(size: [f64; 3], cells: [usize; 3], material: &Material) -> Model {
+pub(crate) fn tet_box(size: [f64; 3], cells: [usize; 3], material: &Material) -> Model {
     let mesh = box_mesh(V::zeros(), size.into(), cells, BoxPattern::Tet5 { parity: false });
     Model::tet4(&mesh, material, Volumetric::Full).unwrap()
 }
 
 /// Nodes at rest with coordinate 0 along `axis`, held where they are.
-pub fn held_at_zero(model: &Model, axis: usize) -> Vec<FixedCopy> {
+pub(crate) fn held_at_zero(model: &Model, axis: usize) -> Vec<FixedCopy> {
     let at_zero = |(i, x): (usize, &V)| {
         (x[axis].abs() < 1e-12).then(|| FixedCopy {
             copy: i as u32,
@@ -38,7 +38,7 @@ pub fn held_at_zero(model: &Model, axis: usize) -> Vec<FixedCopy> {
 }
 
 /// Newton's method as far as double precision goes, each step solved directly.
-pub fn accurate(scheme: Scheme, mass: MassKind) -> DynamicsSettings {
+pub(crate) fn accurate(scheme: Scheme, mass: MassKind) -> DynamicsSettings {
     let linear = LinearSettings {
         method: Method::Cholesky,
         precision: Precision::Double,
@@ -50,7 +50,7 @@ pub fn accurate(scheme: Scheme, mass: MassKind) -> DynamicsSettings {
 }
 
 /// A body on its way, alone in the world.
-pub struct Run {
+pub(crate) struct Run {
     pub dynamics: Dynamics,
     pub model: Model,
     pub settings: DynamicsSettings,
@@ -65,7 +65,7 @@ pub struct Run {
 }
 
 impl Run {
-    pub fn new(model: Model, material: Material, settings: DynamicsSettings) -> Self {
+    pub(crate) fn new(model: Model, material: Material, settings: DynamicsSettings) -> Self {
         let n = model.n_nodes();
         let state = State { x: model.rest().to_vec(), v: vec![V::zeros(); n], viscous: Vec::new() };
         Self {
@@ -84,14 +84,14 @@ impl Run {
     }
 
     /// Spins about the centre of mass.
-    pub fn spin(&mut self, omega: V) {
+    pub(crate) fn spin(&mut self, omega: V) {
         let centre = self.centre_of_mass();
         for (v, x) in self.state.v.iter_mut().zip(&self.state.x) {
             *v = omega.cross(&(x - centre));
         }
     }
 
-    pub fn step(&mut self, h: f64) -> SolveReport {
+    pub(crate) fn step(&mut self, h: f64) -> SolveReport {
         let Self { dynamics, model, masses: mass, state, fixed, load, gravity, team, .. } = self;
         let parts = &LooseParts::connected(|visit| model.for_groups(visit), mass, fixed);
         let (gravity, rest) = (*gravity, model.rest());
@@ -115,39 +115,39 @@ impl Run {
     }
 
     /// Steps that must all advance.
-    pub fn steps(&mut self, h: f64, steps: usize) {
+    pub(crate) fn steps(&mut self, h: f64, steps: usize) {
         for _ in 0..steps {
             let report = self.step(h);
             assert_eq!(report.outcome, Outcome::Advanced, "{report:?}");
         }
     }
 
-    pub fn energy(&self) -> f64 {
+    pub(crate) fn energy(&self) -> f64 {
         self.kinetic_energy(&self.state.v) + self.model.energy(&self.state.x)
     }
 
     /// ½ vᵀ M v.
-    pub fn kinetic_energy(&self, v: &[V]) -> f64 {
+    pub(crate) fn kinetic_energy(&self, v: &[V]) -> f64 {
         self.dynamics.solver().kinetic_energy(&self.masses, v)
     }
 
     /// ω_max at `x`.
-    pub fn omega_max(&mut self, x: &[V], fixed: &[FixedCopy]) -> f64 {
+    pub(crate) fn omega_max(&mut self, x: &[V], fixed: &[FixedCopy]) -> f64 {
         omega_max(&mut self.team, &self.model, (self.density_kg_m3, self.settings.mass), x, fixed)
     }
 
-    pub fn centre_of_mass(&self) -> V {
+    pub(crate) fn centre_of_mass(&self) -> V {
         let mass = &self.masses;
         let moment: V = self.state.x.iter().zip(mass).map(|(x, m)| *m * x).sum();
         moment / mass.iter().sum::<f64>()
     }
 
-    pub fn momentum(&self) -> V {
+    pub(crate) fn momentum(&self) -> V {
         self.state.v.iter().zip(&self.masses).map(|(v, m)| *m * v).sum()
     }
 
     /// About the origin, with lumped masses.
-    pub fn angular_momentum(&self) -> V {
+    pub(crate) fn angular_momentum(&self) -> V {
         let State { x, v, .. } = &self.state;
         self.masses.iter().zip(x).zip(v).map(|((m, x), v)| *m * x.cross(v)).sum()
     }

@@ -39,7 +39,7 @@ fn points(model: &Model, e: usize) -> Vec<Point> {
 }
 
 /// f_a = ∫ N_a b dV [N] of a body force density b(X) [N/m³], for uncut models.
-pub fn consistent_load(model: &Model, b: &dyn Fn(&Vector3<f64>) -> Vector3<f64>) -> Vec<Vector3<f64>> {
+pub(crate) fn consistent_load(model: &Model, b: &dyn Fn(&Vector3<f64>) -> Vector3<f64>) -> Vec<Vector3<f64>> {
     let mut f = vec![Vector3::zeros(); model.n_nodes()];
     for e in 0..model.n_elements() {
         for point in points(model, e) {
@@ -53,7 +53,7 @@ pub fn consistent_load(model: &Model, b: &dyn Fn(&Vector3<f64>) -> Vector3<f64>)
 }
 
 /// √∫ ‖u_h − u‖² dV [m^5/2] of the solution at positions `x` [m].
-pub fn l2_error(model: &Model, x: &[Vector3<f64>], u: &dyn Fn(&Vector3<f64>) -> Vector3<f64>) -> f64 {
+pub(crate) fn l2_error(model: &Model, x: &[Vector3<f64>], u: &dyn Fn(&Vector3<f64>) -> Vector3<f64>) -> f64 {
     let mut sum = 0.0;
     for e in 0..model.n_elements() {
         for point in points(model, e) {

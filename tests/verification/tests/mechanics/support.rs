@@ -17,44 +17,44 @@ use scindo_physics::team::Team;
 const TOLERANCE: f64 = 3e-9;
 
 /// An undamped material.
-pub fn material(young_pa: f64, poisson: f64, density_kg_m3: f64, law: Law) -> Material {
+pub(crate) fn material(young_pa: f64, poisson: f64, density_kg_m3: f64, law: Law) -> Material {
     Material { young_pa, poisson, density_kg_m3, rayleigh: Rayleigh::default(), law }
 }
 
 /// A node that is held in `axes` at `position_m`.
-pub fn held(node: usize, axes: [bool; 3], position_m: Vector3<f64>) -> FixedCopy {
+pub(crate) fn held(node: usize, axes: [bool; 3], position_m: Vector3<f64>) -> FixedCopy {
     FixedCopy { copy: node as u32, held: axes.into(), position_m: position_m.into() }
 }
 
 /// The nodes for which `choose` is true, held in all directions where they are at rest.
-pub fn clamped(model: &Model, choose: impl Fn(&Vector3<f64>) -> bool) -> Vec<FixedCopy> {
+pub(crate) fn clamped(model: &Model, choose: impl Fn(&Vector3<f64>) -> bool) -> Vec<FixedCopy> {
     let rest = model.rest();
     (0..rest.len()).filter(|&n| choose(&rest[n])).map(|n| held(n, [true; 3], rest[n])).collect()
 }
 
 /// Whether the cases that take long were asked for.
-pub fn long_tests() -> bool {
+pub(crate) fn long_tests() -> bool {
     std::env::var_os("SCINDO_LONG_TESTS").is_some()
 }
 
 /// Path of a file in `tests/reference`.
-pub fn reference_path(file: &str) -> PathBuf {
+pub(crate) fn reference_path(file: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../reference").join(file)
 }
 
 /// A reference file in JSON.
-pub fn reference(file: &str) -> serde_json::Value {
+pub(crate) fn reference(file: &str) -> serde_json::Value {
     serde_json::from_str(&std::fs::read_to_string(reference_path(file)).unwrap()).unwrap()
 }
 
 /// A vector of a reference file.
-pub fn vector(value: &serde_json::Value) -> Vector3<f64> {
+pub(crate) fn vector(value: &serde_json::Value) -> Vector3<f64> {
     Vector3::from_fn(|i, _| value[i].as_f64().unwrap())
 }
 
 /// Static equilibrium of `model` under nodal `loads` [N] (none: no load) from `start`, with the held
 /// nodes at their positions. Panics unless it converges to [`TOLERANCE`].
-pub fn equilibrium(
+pub(crate) fn equilibrium(
     model: &Model,
     loads: &[Vector3<f64>],
     fixed: &[FixedCopy],
@@ -64,7 +64,7 @@ pub fn equilibrium(
 }
 
 /// The same with a method of choice for the linear systems.
-pub fn equilibrium_by(
+pub(crate) fn equilibrium_by(
     method: Method,
     model: &Model,
     loads: &[Vector3<f64>],

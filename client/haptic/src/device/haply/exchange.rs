@@ -32,7 +32,7 @@ const MAX_MESSAGE: usize = 1 << 20;
 
 /// Why a session with the service ends.
 #[derive(Debug, thiserror::Error)]
-pub enum Lost {
+pub(crate) enum Lost {
     /// Nothing listens at the address, or the network is down.
     #[error("no service at {address}: {source}")]
     Unreachable {
@@ -56,7 +56,7 @@ impl From<tungstenite::Error> for Lost {
 }
 
 /// A connection to a service.
-pub struct Session {
+pub(crate) struct Session {
     socket: WebSocket<TcpStream>,
 }
 
@@ -65,7 +65,7 @@ impl Session {
     ///
     /// # Errors
     /// Nothing listens, or it is no Haply service.
-    pub fn open(address: &str) -> Result<(Self, Update), Lost> {
+    pub(crate) fn open(address: &str) -> Result<(Self, Update), Lost> {
         let unreachable = |source| Lost::Unreachable { address: address.to_owned(), source };
         let stream = connect(address).map_err(unreachable)?;
         let config =

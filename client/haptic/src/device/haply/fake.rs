@@ -14,7 +14,7 @@ use tungstenite::{Message, WebSocket};
 
 /// Which service it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Version {
+pub(crate) enum Version {
     /// Force in `values`, short configuration.
     Old,
     /// Force in `vector`, long configuration.
@@ -23,7 +23,7 @@ pub enum Version {
 
 /// What the test sets and what the service has seen.
 #[derive(Debug, Clone)]
-pub struct World {
+pub(crate) struct World {
     pub position_m: [f64; 3],
     pub velocity_m_s: [f64; 3],
     pub buttons: [bool; 2],
@@ -62,7 +62,7 @@ impl Default for World {
 }
 
 /// The service. It ends with the test.
-pub struct FakeService {
+pub(crate) struct FakeService {
     pub address: String,
     pub world: Arc<Mutex<World>>,
     stop: Arc<AtomicBool>,
@@ -70,11 +70,11 @@ pub struct FakeService {
 }
 
 impl FakeService {
-    pub fn start(version: Version) -> Self {
+    pub(crate) fn start(version: Version) -> Self {
         Self::at("127.0.0.1:0", version)
     }
 
-    pub fn at(address: &str, version: Version) -> Self {
+    pub(crate) fn at(address: &str, version: Version) -> Self {
         // A port that was used a moment ago may take a while to be free.
         let end = Instant::now() + Duration::from_secs(20);
         let listener = loop {
@@ -100,11 +100,11 @@ impl FakeService {
         Self { address, world, stop, thread: Some(thread) }
     }
 
-    pub fn set(&self, change: impl FnOnce(&mut World)) {
+    pub(crate) fn set(&self, change: impl FnOnce(&mut World)) {
         change(&mut self.world.lock().unwrap());
     }
 
-    pub fn seen(&self) -> World {
+    pub(crate) fn seen(&self) -> World {
         self.world.lock().unwrap().clone()
     }
 }

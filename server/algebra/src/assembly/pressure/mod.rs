@@ -158,7 +158,7 @@ impl Pressure {
     }
 
     /// Σ p V [J], V the volume between a face and `apex` [m].
-    fn potential(&self, x: &[Vector3<f64>], apex: &Vector3<f64>) -> f64 {
+    pub fn potential(&self, x: &[Vector3<f64>], apex: &Vector3<f64>) -> f64 {
         let mut potential = 0.0;
         for_faces!(self, |face, p, N, rule| {
             let y = self.positions::<N>(face, x).map(|y| y - apex);
@@ -168,7 +168,7 @@ impl Pressure {
     }
 
     /// Adds the gradient of [`potential`](Self::potential) [N].
-    fn add_gradient(&self, x: &[Vector3<f64>], apex: &Vector3<f64>, g: &mut [Vector3<f64>]) {
+    pub fn add_gradient(&self, x: &[Vector3<f64>], apex: &Vector3<f64>, g: &mut [Vector3<f64>]) {
         for_faces!(self, |face, p, N, rule| {
             let y = self.positions::<N>(face, x).map(|y| y - apex);
             let mut sum = [Vector3::zeros(); N];

@@ -12,7 +12,7 @@ use super::sectors::SectorTable;
 /// Eight cells with one table.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
-pub struct SectorBatch {
+pub(super) struct SectorBatch {
     /// √c R̂ with the factor c of the cell; 0 in unused lanes.
     pub rotation: Mat3<Lanes>,
     /// √c.
@@ -22,30 +22,30 @@ pub struct SectorBatch {
 }
 
 /// Batches are asked for so many turns before they are needed.
-pub const AHEAD: usize = 4;
+pub(super) const AHEAD: usize = 4;
 
 /// Weights of hanging slots, in the order of [`HANGING_SLOTS`](super::lane::HANGING_SLOTS): ½ or ¼ where the slot hangs, 0 elsewhere.
-pub type HangingWeights = [Lanes; 6];
+pub(super) type HangingWeights = [Lanes; 6];
 
 /// A table as the kernel reads it: every entry in all lanes.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct TableLanes(pub [[Lanes; 6]; 8]);
+pub(super) struct TableLanes(pub [[Lanes; 6]; 8]);
 
 impl TableLanes {
     /// Rounds the entries.
-    pub fn new(table: &SectorTable) -> Self {
+    pub(super) fn new(table: &SectorTable) -> Self {
         Self(table.sectors.map(|sector| sector.map(|s| Lanes([s as f32; LANES]))))
     }
 }
 
 /// The corners of eight cells: component, then slot or parity.
-pub type Corners<V> = [[V; 8]; 3];
+pub(super) type Corners<V> = [[V; 8]; 3];
 
 /// y += Σ Wᵀ c R̂ S R̂ᵀ W x over the batches. `weights` has an entry per batch, or none if no slot hangs.
 ///
 /// # Safety
 /// All local numbers are below the lengths of `x` and `y`, which are the same.
-pub unsafe fn multiply(
+pub(super) unsafe fn multiply(
     simd: Simd,
     batches: &[SectorBatch],
     weights: &[HangingWeights],
@@ -130,7 +130,7 @@ unsafe fn multiply_with<V: Batched<N>, const N: usize, const HANGING: bool>(
 /// # Safety
 /// All local numbers are below the length of `x`.
 #[inline(always)]
-pub unsafe fn gather<V: Batched<N>, const N: usize, B>(
+pub(super) unsafe fn gather<V: Batched<N>, const N: usize, B>(
     x: &[Padded],
     from: &[B; N],
     nodes: impl Fn(&B) -> &[Ids; 8],
@@ -159,7 +159,7 @@ pub unsafe fn gather<V: Batched<N>, const N: usize, B>(
 /// # Safety
 /// All local numbers are below the length of `y`.
 #[inline(always)]
-pub unsafe fn scatter<V: Vector8>(y: &mut [Padded], nodes: &[Ids; 8], f: &Corners<V>) {
+pub(super) unsafe fn scatter<V: Vector8>(y: &mut [Padded], nodes: &[Ids; 8], f: &Corners<V>) {
     for_eight!(j => {
         // SAFETY: the caller's promise.
         unsafe { V::scatter(y, &nodes[j], [f[0][j], f[1][j], f[2][j]]) };
@@ -168,7 +168,7 @@ pub unsafe fn scatter<V: Vector8>(y: &mut [Padded], nodes: &[Ids; 8], f: &Corner
 
 /// The corners of one batch.
 #[inline(always)]
-pub fn part_of<V: Batched<N>, const N: usize>(u: &Corners<V>, batch: usize) -> Corners<V::Part> {
+pub(super) fn part_of<V: Batched<N>, const N: usize>(u: &Corners<V>, batch: usize) -> Corners<V::Part> {
     let mut out = [[V::Part::splat(0.0); 8]; 3];
     for i in 0..3 {
         for_eight!(j => {
@@ -180,7 +180,7 @@ pub fn part_of<V: Batched<N>, const N: usize>(u: &Corners<V>, batch: usize) -> C
 
 /// W: displacements of the corners from those of the vertices.
 #[inline(always)]
-pub fn interpolate<V: Vector>(u: &mut Corners<V>, weights: &[V; 6]) {
+pub(super) fn interpolate<V: Vector>(u: &mut Corners<V>, weights: &[V; 6]) {
     let [w1, w2, w4, w3, w5, w6] = *weights;
     let minus_three = V::splat(-3.0);
     for i in 0..3 {
@@ -201,7 +201,7 @@ pub fn interpolate<V: Vector>(u: &mut Corners<V>, weights: &[V; 6]) {
 
 /// Wᵀ: forces on the vertices from those on the corners.
 #[inline(always)]
-pub fn distribute<V: Vector>(f: &mut Corners<V>, weights: &[V; 6]) {
+pub(super) fn distribute<V: Vector>(f: &mut Corners<V>, weights: &[V; 6]) {
     let [w1, w2, w4, w3, w5, w6] = *weights;
     let minus_three = V::splat(-3.0);
     for i in 0..3 {
@@ -223,7 +223,7 @@ pub fn distribute<V: Vector>(f: &mut Corners<V>, weights: &[V; 6]) {
 
 /// Weights of every batch.
 #[inline(always)]
-pub fn read_weights<V: Batched<N>, const N: usize>(weights: &[HangingWeights; N]) -> [V; 6] {
+pub(super) fn read_weights<V: Batched<N>, const N: usize>(weights: &[HangingWeights; N]) -> [V; 6] {
     let mut out = [V::splat(0.0); 6];
     for k in 0..6 {
         out[k] = V::read(weights, |weights| &weights[k]);
@@ -233,7 +233,7 @@ pub fn read_weights<V: Batched<N>, const N: usize>(weights: &[HangingWeights; N]
 
 /// û_p = Σ_j (−1)^{|j & p|} u_j, in place.
 #[inline(always)]
-pub fn transform<V: Vector>(u: &mut Corners<V>) {
+pub(super) fn transform<V: Vector>(u: &mut Corners<V>) {
     for i in 0..3 {
         let [a, b, c, d, e, f, g, h] = u[i];
         let (a, b, c, d) = (a + b, a - b, c + d, c - d);
@@ -246,7 +246,7 @@ pub fn transform<V: Vector>(u: &mut Corners<V>) {
 
 /// √c R̂ᵀ u.
 #[inline(always)]
-pub fn to_cell<V: Vector>(u: &mut Corners<V>, R: &Mat3<V>) {
+pub(super) fn to_cell<V: Vector>(u: &mut Corners<V>, R: &Mat3<V>) {
     let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = *R;
     for_eight!(p => {
         let (x, y, z) = (u[0][p], u[1][p], u[2][p]);
@@ -258,7 +258,7 @@ pub fn to_cell<V: Vector>(u: &mut Corners<V>, R: &Mat3<V>) {
 
 /// √c R̂ f.
 #[inline(always)]
-pub fn from_cell<V: Vector>(f: &mut Corners<V>, R: &Mat3<V>) {
+pub(super) fn from_cell<V: Vector>(f: &mut Corners<V>, R: &Mat3<V>) {
     let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = *R;
     for_eight!(p => {
         let (x, y, z) = (f[0][p], f[1][p], f[2][p]);
@@ -270,7 +270,7 @@ pub fn from_cell<V: Vector>(f: &mut Corners<V>, R: &Mat3<V>) {
 
 /// The rotation of every batch.
 #[inline(always)]
-pub fn read_matrix<V: Batched<N>, const N: usize, B>(
+pub(super) fn read_matrix<V: Batched<N>, const N: usize, B>(
     from: &[B; N],
     field: impl Fn(&B) -> &Mat3<Lanes>,
 ) -> Mat3<V> {
@@ -283,7 +283,7 @@ pub fn read_matrix<V: Batched<N>, const N: usize, B>(
 
 /// S û.
 #[inline(always)]
-pub fn multiply_sectors<V: Batched<N>, const N: usize>(u: &mut Corners<V>, table: &TableLanes) {
+pub(super) fn multiply_sectors<V: Batched<N>, const N: usize>(u: &mut Corners<V>, table: &TableLanes) {
     for_eight!(q => {
         let [xx, xy, xz, yy, yz, zz] = &table.0[q];
         let (xx, xy, xz) = (V::shared(xx), V::shared(xy), V::shared(xz));
@@ -305,7 +305,7 @@ mod avx2 {
     /// # Safety
     /// As for [`super::multiply`].
     #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn multiply(
+    pub(super) unsafe fn multiply(
         batches: &[SectorBatch],
         weights: &[HangingWeights],
         table: &TableLanes,
@@ -328,7 +328,7 @@ mod avx512 {
     /// # Safety
     /// As for [`super::multiply`].
     #[target_feature(enable = "avx512f,avx2,fma")]
-    pub unsafe fn multiply(
+    pub(super) unsafe fn multiply(
         batches: &[SectorBatch],
         weights: &[HangingWeights],
         table: &TableLanes,

@@ -13,14 +13,14 @@ use super::stored::{Entry, StoredBatch, stored_entry};
 
 /// Diagonal blocks (xx, xy, xz, yy, yz, zz) of a table in the frame of a cell, by the set of hanging slots.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct BlockTable(#[serde(with = "scindo_matter::storage::saved::arrays")] Vec<[f32; BLOCKS]>);
+pub(super) struct BlockTable(#[serde(with = "scindo_matter::storage::saved::arrays")] Vec<[f32; BLOCKS]>);
 
 /// Entries of the blocks of all slots, one block after the other.
 const BLOCKS: usize = 48;
 
 impl BlockTable {
     /// The blocks of all sets of slots 1 … 6.
-    pub fn new(table: &SectorTable) -> Self {
+    pub(super) fn new(table: &SectorTable) -> Self {
         let K = table.matrix();
         let of = |set: u8| {
             let blocks = rounded(&K, set << 1);
@@ -44,7 +44,7 @@ fn rounded(K: &Matrix24, hanging: u8) -> [[f32; 6]; 8] {
 ///
 /// # Safety
 /// All local numbers are below the length of `rows`.
-pub unsafe fn add(
+pub(super) unsafe fn add(
     simd: Simd,
     batches: &[SectorBatch],
     hanging: &[[u8; LANES]],
@@ -154,7 +154,7 @@ unsafe fn add_plain<V: Vector8>(R: &[[V; 3]; 3], B: &[f32; BLOCKS], nodes: &[Ids
 ///
 /// # Safety
 /// All local numbers are below the length of `rows`.
-pub unsafe fn add_stored<E: Entry>(simd: Simd, batches: &[StoredBatch<E>], rows: &mut [Block6]) {
+pub(super) unsafe fn add_stored<E: Entry>(simd: Simd, batches: &[StoredBatch<E>], rows: &mut [Block6]) {
     match simd {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: both come from `Simd::detect` only; the rest is the caller's promise.
@@ -183,7 +183,12 @@ unsafe fn add_stored_with<V: Vector8, E: Entry>(batches: &[StoredBatch<E>], rows
 }
 
 /// The same of one lane whose slots `hanging` hang: blocks of R Wᵀ A W Rᵀ.
-pub fn add_stored_lane<E: Entry>(batch: &StoredBatch<E>, hanging: u8, lane: usize, rows: &mut [Block6]) {
+pub(super) fn add_stored_lane<E: Entry>(
+    batch: &StoredBatch<E>,
+    hanging: u8,
+    lane: usize,
+    rows: &mut [Block6],
+) {
     let R = Matrix3::from_fn(|i, j| batch.rotation[3 * i + j].0[lane]);
     for ([xx, xy, xz, yy, yz, zz], ids) in rounded(&batch.matrix(lane), hanging).into_iter().zip(&batch.nodes)
     {
@@ -205,7 +210,7 @@ mod avx2 {
     /// # Safety
     /// As for [`super::add`].
     #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn add(
+    pub(super) unsafe fn add(
         batches: &[SectorBatch],
         hanging: &[[u8; LANES]],
         table: &BlockTable,
@@ -218,7 +223,7 @@ mod avx2 {
     /// # Safety
     /// As for [`super::add_stored`].
     #[target_feature(enable = "avx2,fma,f16c")]
-    pub unsafe fn add_stored<E: Entry>(batches: &[StoredBatch<E>], rows: &mut [Block6]) {
+    pub(super) unsafe fn add_stored<E: Entry>(batches: &[StoredBatch<E>], rows: &mut [Block6]) {
         // SAFETY: the caller's promise.
         unsafe { super::add_stored_with::<Register, E>(batches, rows) };
     }

@@ -20,14 +20,14 @@ use super::sectors::hanging_slots;
 use super::stored::{self, Entry, STORED, StoredBatch};
 
 /// Vertices of the largest chunks, of 1024 cells that have none in common.
-pub const MOST_VERTICES: usize = 0x2000;
+pub(super) const MOST_VERTICES: usize = 0x2000;
 
 /// A vector by local number. It is on the stack: one chunk after the other needs it, so it stays near the core.
-pub type LocalVector = SmallVec<[Padded; MOST_VERTICES]>;
+pub(super) type LocalVector = SmallVec<[Padded; MOST_VERTICES]>;
 
 /// A table in the forms that the loops read.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Table {
+pub(super) struct Table {
     /// For products.
     pub lanes: TableLanes,
     /// For diagonal blocks.
@@ -36,7 +36,7 @@ pub struct Table {
 
 /// Batches with the same table, or stored ones; with or without hanging slots.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Group {
+pub(super) struct Group {
     /// Table or stored.
     pub matrix: CellMatrix,
     /// Batches, counted over all groups of the chunk.
@@ -47,7 +47,7 @@ pub struct Group {
 
 /// What the lanes of a batch hold.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
-pub struct BatchLanes {
+pub(super) struct BatchLanes {
     /// Number of every cell, [`NO_PIECE`] in unused lanes.
     pub cells: [u32; LANES],
     /// Octants of the cells.
@@ -58,7 +58,7 @@ pub struct BatchLanes {
 
 /// A run of cells in batches.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct CellChunk {
+pub(super) struct CellChunk {
     /// Vertex of every local number, ascending.
     pub vertices: Vec<u32>,
     /// Vector of the last product with a direction, by local number; empty before the first one.
@@ -82,7 +82,7 @@ pub struct CellChunk {
 
 impl CellChunk {
     /// Arranges the cells `members` in batches; `lane` gives what each of them is.
-    pub fn new(members: &[u32], lane: &dyn Fn(u32) -> CellLane) -> Self {
+    pub(super) fn new(members: &[u32], lane: &dyn Fn(u32) -> CellLane) -> Self {
         let cells: Vec<CellLane> = members.iter().map(|&id| lane(id)).collect();
         let (numbers, vertices) = LocalNumbers::of(&cells);
         let mut kinds: BTreeMap<(CellMatrix, bool), Vec<usize>> = BTreeMap::new();
@@ -153,13 +153,13 @@ impl CellChunk {
 
     /// Asks for what a product reads first.
     #[inline(always)]
-    pub fn ask_for_first(&self) {
+    pub(super) fn ask_for_first(&self) {
         prefetch(self.batches.get(..batch::AHEAD).unwrap_or(&self.batches));
     }
 
     /// y = s K̂ x; `x` has a row for every local number, and `y` perhaps more.
     #[inline(always)]
-    pub fn apply(&self, simd: Simd, tables: &[Table], x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn apply(&self, simd: Simd, tables: &[Table], x: &[Padded], y: &mut [Padded]) {
         assert!(x.len() == self.vertices.len());
         let y = &mut y[..x.len()];
         y.fill([0.0; 4]);
@@ -183,13 +183,13 @@ impl CellChunk {
     }
 
     /// The vector of products with directions; the first one makes room for it.
-    pub fn room(&mut self) -> &mut [Padded] {
+    pub(super) fn room(&mut self) -> &mut [Padded] {
         self.x.resize(self.vertices.len(), [0.0; 4]);
         &mut self.x
     }
 
     /// Diagonal blocks of s K̂, by local number.
-    pub fn diagonals(&self, simd: Simd, tables: &[Table], rows: &mut [Block6]) {
+    pub(super) fn diagonals(&self, simd: Simd, tables: &[Table], rows: &mut [Block6]) {
         let rows = &mut rows[..self.vertices.len()];
         rows.fill([0.0; 8]);
         for group in &self.groups {
@@ -237,14 +237,14 @@ impl CellChunk {
     }
 
     /// Cell, batch and lane of all lanes in use.
-    pub fn places(&self) -> impl Iterator<Item = (u32, usize, usize)> + '_ {
+    pub(super) fn places(&self) -> impl Iterator<Item = (u32, usize, usize)> + '_ {
         let lanes = self.lanes.iter().enumerate();
         let lanes = lanes.flat_map(|(b, batch)| batch.cells.iter().enumerate().map(move |(l, &c)| (c, b, l)));
         lanes.filter(|&(cell, ..)| cell != NO_PIECE)
     }
 
     /// Rotation R of a lane with a table; I for a stored matrix.
-    pub fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
+    pub(super) fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
         match self.batches.get(batch) {
             Some(b) => {
                 let R = Matrix3::from_fn(|i, j| b.rotation[3 * i + j].0[lane] / b.root.0[lane]);
@@ -255,7 +255,7 @@ impl CellChunk {
     }
 
     /// Sets the factor c of every cell with a table; `of` gives it from the number of the cell.
-    pub fn set_factors(&mut self, of: &impl Fn(u32) -> f32) {
+    pub(super) fn set_factors(&mut self, of: &impl Fn(u32) -> f32) {
         for (batch, lanes) in self.batches.iter_mut().zip(&self.lanes) {
             for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
                 let (root, before) = (of(cell).sqrt(), batch.root.0[lane]);
@@ -266,7 +266,7 @@ impl CellChunk {
     }
 
     /// Sets the rotation R of every cell with a table; `of` gives it from the number of the cell.
-    pub fn set_rotations(&mut self, of: &impl Fn(u32) -> Matrix3<f32>) {
+    pub(super) fn set_rotations(&mut self, of: &impl Fn(u32) -> Matrix3<f32>) {
         for (batch, lanes) in self.batches.iter_mut().zip(&self.lanes) {
             for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
                 let R = turned(&of(cell), lanes.octants[lane]);
@@ -278,7 +278,7 @@ impl CellChunk {
     }
 
     /// Sets the rotation R of every cell with a stored matrix.
-    pub fn set_stored_rotations(&mut self, of: &impl Fn(u32) -> Matrix3<f32>) {
+    pub(super) fn set_stored_rotations(&mut self, of: &impl Fn(u32) -> Matrix3<f32>) {
         let lanes = &self.lanes[self.batches.len()..];
         let (single, half) = lanes.split_at(self.stored.len());
         let rotations = self.stored.iter_mut().map(|batch| &mut batch.rotation).zip(single);
@@ -292,14 +292,19 @@ impl CellChunk {
     }
 
     /// Sets stored matrices as in [`CellOperator::set_stored`](super::CellOperator::set_stored).
-    pub fn set_stored<'a>(&mut self, simd: Simd, order: &[u16; STORED], of: &impl Fn(u32) -> Given<'a>) {
+    pub(super) fn set_stored<'a>(
+        &mut self,
+        simd: Simd,
+        order: &[u16; STORED],
+        of: &impl Fn(u32) -> Given<'a>,
+    ) {
         let (single, half) = self.lanes[self.batches.len()..].split_at(self.stored.len());
         set_matrices(simd, (&mut self.stored, single), order, of);
         set_matrices(simd, (&mut self.half, half), order, of);
     }
 
     /// Bytes in use: all but stored matrices, and these.
-    pub fn memory(&self) -> [usize; 2] {
+    pub(super) fn memory(&self) -> [usize; 2] {
         let stored = size_of_val(&self.stored[..]) + size_of_val(&self.half[..]);
         let others = size_of_val(&self.vertices[..])
             + size_of_val(&self.x[..])
@@ -312,7 +317,7 @@ impl CellChunk {
     }
 
     /// Bytes that one application streams.
-    pub fn bytes(&self) -> usize {
+    pub(super) fn bytes(&self) -> usize {
         self.batches.len() * size_of::<SectorBatch>()
             + size_of_val(&self.stored[..])
             + size_of_val(&self.half[..])

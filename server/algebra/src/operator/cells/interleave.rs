@@ -4,7 +4,7 @@ use scindo_matter::element::{LANES, Lanes, Vector8};
 
 /// Lane l of `to[k]` becomes number k of `from[l]`.
 #[inline(always)]
-pub fn interleave<V: Vector8, const N: usize>(from: &[&[f32; N]; LANES], to: &mut [Lanes; N]) {
+pub(super) fn interleave<V: Vector8, const N: usize>(from: &[&[f32; N]; LANES], to: &mut [Lanes; N]) {
     let whole = N / LANES * LANES;
     for at in (0..whole).step_by(LANES) {
         let mut rows = [V::splat(0.0); LANES];

@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use scindo_matter::octree::Octree;
 
 /// Slots that may hang, in the order of their weights: three edges, three faces of the parent.
-pub const HANGING_SLOTS: [usize; 6] = [1, 2, 4, 3, 5, 6];
+pub(super) const HANGING_SLOTS: [usize; 6] = [1, 2, 4, 3, 5, 6];
 
 /// The matrix of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
@@ -58,18 +58,18 @@ pub fn slot_hanging(hanging: u8, octant: u8) -> u8 {
 }
 
 /// The diagonal of δD, the reflection of an octant with the sign that makes it a rotation.
-pub fn frame(octant: u8) -> [f32; 3] {
+pub(super) fn frame(octant: u8) -> [f32; 3] {
     let delta = handedness(octant);
     [0, 1, 2].map(|k| if octant >> k & 1 == 1 { -delta } else { delta })
 }
 
 /// δ = det D of an octant, 1 or −1.
-pub fn handedness(octant: u8) -> f32 {
+pub(super) fn handedness(octant: u8) -> f32 {
     if octant.count_ones().is_multiple_of(2) { 1.0 } else { -1.0 }
 }
 
 /// R δD, which also takes R̂ = R δD back to R.
-pub fn turned(R: &Matrix3<f32>, octant: u8) -> Matrix3<f32> {
+pub(super) fn turned(R: &Matrix3<f32>, octant: u8) -> Matrix3<f32> {
     let frame = frame(octant);
     Matrix3::from_fn(|i, j| R[(i, j)] * frame[j])
 }

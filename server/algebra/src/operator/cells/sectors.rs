@@ -101,13 +101,13 @@ pub fn unit_stiffness(Lame { mu, lambda }: Lame) -> Matrix24 {
 
 /// Weights of the slots' vertices in the displacement of slot `j`, which hangs: bit s of the first number is set
 /// for slots s that count, each with the second number.
-pub fn hanging_slots(j: usize) -> (u8, f64) {
+pub(super) fn hanging_slots(j: usize) -> (u8, f64) {
     let slots = (0..8).filter(|s| s & !j == 0).fold(0_u8, |slots, s| slots | 1 << s);
     (slots, 1.0 / f64::from(slots.count_ones()))
 }
 
 /// Diagonal blocks (xx, xy, xz, yy, yz, zz) of Wᵀ K W for a cell whose slots `hanging` hang, one per slot.
-pub fn diagonal_blocks(K: &Matrix24, hanging: u8) -> [[f64; 6]; 8] {
+pub(super) fn diagonal_blocks(K: &Matrix24, hanging: u8) -> [[f64; 6]; 8] {
     let W: [[f64; 8]; 8] = from_fn(|j| {
         let (slots, weight) = if hanging >> j & 1 == 1 { hanging_slots(j) } else { (1 << j, 1.0) };
         from_fn(|v| if slots >> v & 1 == 1 { weight } else { 0.0 })

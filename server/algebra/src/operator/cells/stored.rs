@@ -25,7 +25,7 @@ pub const fn stored_entry(r: usize, s: usize) -> usize {
 }
 
 /// One entry of eight matrices.
-pub trait Entry: Copy + Default + Serialize + DeserializeOwned {
+pub(super) trait Entry: Copy + Default + Serialize + DeserializeOwned {
     /// Largest magnitude that the entries of a matrix are scaled to; `None` leaves them as they are.
     const LARGEST: Option<f32>;
 
@@ -67,7 +67,7 @@ impl Entry for Halves {
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(bound = "")]
 #[repr(C)]
-pub struct StoredBatch<E: Entry> {
+pub(super) struct StoredBatch<E: Entry> {
     /// Upper triangles, divided by their scales; 0 in unused lanes.
     #[serde(with = "scindo_matter::storage::saved::array")]
     pub entries: [E; STORED],
@@ -81,14 +81,14 @@ pub struct StoredBatch<E: Entry> {
 
 impl<E: Entry> StoredBatch<E> {
     /// A batch whose matrices are 0.
-    pub fn new(nodes: [Ids; 8]) -> Self {
+    pub(super) fn new(nodes: [Ids; 8]) -> Self {
         let mut rotation = Mat3::<Lanes>::default();
         [0, 4, 8].into_iter().for_each(|i| rotation[i] = Lanes([1.0; LANES]));
         Self { entries: [E::default(); STORED], scale: Lanes([1.0; LANES]), rotation, nodes }
     }
 
     /// Sets the matrices of all lanes. Entry k of the upper triangle is number `order[k]` of what `from` has.
-    pub fn set(&mut self, simd: Simd, from: &[&[f32; STORED]; LANES], order: &[u16; STORED]) {
+    pub(super) fn set(&mut self, simd: Simd, from: &[&[f32; STORED]; LANES], order: &[u16; STORED]) {
         match simd {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: both come from `Simd::detect` only.
@@ -116,7 +116,7 @@ impl<E: Entry> StoredBatch<E> {
     }
 
     /// The matrix A of a lane, without its rotation.
-    pub fn matrix(&self, lane: usize) -> Matrix24 {
+    pub(super) fn matrix(&self, lane: usize) -> Matrix24 {
         let mut A = [[0.0; 24]; 24];
         let mut entries = self.entries.iter();
         for r in 0..24 {
@@ -157,7 +157,7 @@ fn scale(most: f32, largest: f32) -> f32 {
 ///
 /// # Safety
 /// All local numbers are below the lengths of `x` and `y`, which are the same.
-pub unsafe fn multiply<E: Entry>(
+pub(super) unsafe fn multiply<E: Entry>(
     simd: Simd,
     batches: &[StoredBatch<E>],
     weights: &[HangingWeights],
@@ -260,7 +260,7 @@ mod avx2 {
     /// # Safety
     /// The machine has AVX2, FMA and F16C.
     #[target_feature(enable = "avx2,fma,f16c")]
-    pub unsafe fn set<E: Entry>(
+    pub(super) unsafe fn set<E: Entry>(
         batch: &mut StoredBatch<E>,
         from: &[&[f32; STORED]; LANES],
         order: &[u16; STORED],
@@ -271,7 +271,7 @@ mod avx2 {
     /// # Safety
     /// As for [`super::multiply`].
     #[target_feature(enable = "avx2,fma,f16c")]
-    pub unsafe fn multiply<E: Entry>(
+    pub(super) unsafe fn multiply<E: Entry>(
         batches: &[StoredBatch<E>],
         weights: &[HangingWeights],
         x: &[Padded],

@@ -20,7 +20,7 @@ use super::lane::{CellMatrix, handedness};
 
 /// What only an update needs of a chunk.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct RestChunk {
+pub(super) struct RestChunk {
     /// Lattice points, by local number.
     points: Vec<At>,
     /// Of every batch.
@@ -32,7 +32,7 @@ type Positions = SmallVec<[[f64; 4]; MOST_VERTICES]>;
 
 impl RestChunk {
     /// Bytes in use.
-    pub fn memory(&self) -> usize {
+    pub(super) fn memory(&self) -> usize {
         size_of_val(&self.points[..]) + size_of_val(&self.sides[..])
     }
 }
@@ -49,7 +49,7 @@ struct RestBatch {
 
 impl RestChunk {
     /// The rest state of `chunk`: the lattice point of each vertex and the side of each cell [m] by number.
-    pub fn new(chunk: &CellChunk, points: &[At], side: impl Fn(u32) -> f64) -> Self {
+    pub(super) fn new(chunk: &CellChunk, points: &[At], side: impl Fn(u32) -> f64) -> Self {
         let sides = chunk.lanes.iter().map(|lanes| {
             let mut batch = RestBatch { span: Lanes::default(), inverse: Lanes([-1.0; LANES]) };
             for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
@@ -63,7 +63,7 @@ impl RestChunk {
 
     /// Updates the rotations of `chunk` and writes the internal forces [N] of its vertices. `scale` is the s in
     /// the factors of the cells.
-    pub fn update(
+    pub(super) fn update(
         &self,
         simd: Simd,
         chunk: &mut CellChunk,
@@ -98,7 +98,7 @@ impl RestChunk {
 
     /// f = K u with displacements u relative to the chunk's first vertex, subtracted in double precision: the
     /// error is relative to the chunk, not to how far the body has moved.
-    pub fn linear_forces(
+    pub(super) fn linear_forces(
         &self,
         simd: Simd,
         chunk: &mut CellChunk,
@@ -275,7 +275,7 @@ mod avx2 {
     /// # Safety
     /// As for [`super::update`].
     #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn update(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
+    pub(super) unsafe fn update(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
         // SAFETY: the caller's promise.
         unsafe { super::update_with::<Register, 1>(part, 0, x, f) }
     }
@@ -292,7 +292,7 @@ mod avx512 {
     /// # Safety
     /// As for [`super::update`].
     #[target_feature(enable = "avx512f,avx2,fma")]
-    pub unsafe fn update(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
+    pub(super) unsafe fn update(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
         let pairs = part.batches.len() / 2 * 2;
         // SAFETY: the caller's promise.
         unsafe {

@@ -19,21 +19,21 @@ type Matrix24 = SMatrix<f64, 24, 24>;
 
 /// The largest eigenvalue of a leaf by its material and by which of its corners hang, for those that occurred.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct LeafBounds {
+pub(super) struct LeafBounds {
     known: BTreeMap<(u16, u8), f64>,
     largest: f64,
 }
 
 impl LeafBounds {
     /// Forgets all: the constants change.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.known.clear();
         self.largest = 0.0;
     }
 
     /// The bound for a body whose leaves are those of `finest`. Only `changed` leaves are examined, unless nothing is
     /// known yet.
-    pub fn largest(&mut self, finest: &Level, changed: &[u32], with: &Coefficients) -> f64 {
+    pub(super) fn largest(&mut self, finest: &Level, changed: &[u32], with: &Coefficients) -> f64 {
         if self.known.is_empty() {
             (0..finest.cells.len()).for_each(|id| self.add(finest, id, with));
         } else {

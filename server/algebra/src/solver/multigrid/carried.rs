@@ -13,7 +13,7 @@ const HANGING: usize = 256;
 
 /// One matrix for every kind, octant and combination of hanging corners that children have.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Carried {
+pub(super) struct Carried {
     /// Number of the matrix by kind, octant and hanging corners, or [`NONE`].
     number: Vec<u32>,
     matrices: Vec<Dense>,
@@ -22,7 +22,7 @@ pub struct Carried {
 impl Carried {
     /// Computes the matrices of all children that merge; `matrix` gives that of a cell of a level over the vertices
     /// that carry it, if it is the one of its kind.
-    pub fn update(&mut self, hierarchy: &Hierarchy, matrix: impl Fn(usize, usize) -> Dense) {
+    pub(super) fn update(&mut self, hierarchy: &Hierarchy, matrix: impl Fn(usize, usize) -> Dense) {
         self.matrices.clear();
         self.number.clear();
         for l in 0..hierarchy.steps.len() {
@@ -31,7 +31,7 @@ impl Carried {
     }
 
     /// Adds the matrices of these cells of level `l`, if they are not known.
-    pub fn add(
+    pub(super) fn add(
         &mut self,
         hierarchy: &Hierarchy,
         l: usize,
@@ -56,14 +56,14 @@ impl Carried {
 
     /// That of a child with the matrix of its kind.
     #[inline]
-    pub fn get(&self, kind: u32, cell: &Cell, hanging: u8) -> Option<&Dense> {
+    pub(super) fn get(&self, kind: u32, cell: &Cell, hanging: u8) -> Option<&Dense> {
         let number = *self.number.get(slot(kind, cell, hanging))?;
         self.matrices.get(number as usize)
     }
 }
 
 /// Weights of the corners of `parent` in the vertices that carry the fine cell `id`.
-pub fn corners_in(fine: &Level, id: usize, parent: &Cell) -> Weights {
+pub(super) fn corners_in(fine: &Level, id: usize, parent: &Cell) -> Weights {
     std::array::from_fn(|c| trilinear(place_in(fine, id, c, parent)))
 }
 

@@ -28,7 +28,7 @@ const SWEEPS: u32 = 24;
 
 /// The matrix of the coarsest level and its factors.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Coarsest {
+pub(super) struct Coarsest {
     matrix: BlockCsr<f64>,
     cholesky: Cholesky<f64>,
     /// Whether the pattern was analysed.
@@ -53,12 +53,12 @@ pub struct Coarsest {
 
 impl Coarsest {
     /// Analyses the pattern of the coarsest level, if it is small enough.
-    pub fn new(hierarchy: &Hierarchy) -> Self {
+    pub(super) fn new(hierarchy: &Hierarchy) -> Self {
         Self::reusing(Cholesky::default(), hierarchy)
     }
 
     /// The same in place of another one, in its memory: a cut within milliseconds would wait for new pages.
-    pub fn renew(&mut self, hierarchy: &Hierarchy) {
+    pub(super) fn renew(&mut self, hierarchy: &Hierarchy) {
         *self = Self::reusing(std::mem::take(&mut self.cholesky), hierarchy);
     }
 
@@ -89,12 +89,18 @@ impl Coarsest {
     }
 
     /// How it is solved.
-    pub fn solve_kind(&self) -> CoarsestSolve {
+    pub(super) fn solve_kind(&self) -> CoarsestSolve {
         if self.factored { CoarsestSolve::Cholesky } else { CoarsestSolve::Sweeps { degree: SWEEPS } }
     }
 
     /// Follows the matrices, if they changed or the frame of a cell turned by more than `tolerance` [rad].
-    pub fn update(&mut self, hierarchy: &Hierarchy, galerkin: &Galerkin, changed: bool, tolerance: f64) {
+    pub(super) fn update(
+        &mut self,
+        hierarchy: &Hierarchy,
+        galerkin: &Galerkin,
+        changed: bool,
+        tolerance: f64,
+    ) {
         if !self.analysed {
             return;
         }
@@ -137,7 +143,7 @@ impl Coarsest {
 
     /// Adds these stiff springs to the matrix, in place of those that it has, and factorises it if they differ.
     /// Returns `false` if a spring couples vertices of no common cell; the matrix has no springs then.
-    pub fn set_springs(&mut self, columns: &Columns) -> bool {
+    pub(super) fn set_springs(&mut self, columns: &Columns) -> bool {
         if !self.analysed {
             return true;
         }
@@ -180,7 +186,7 @@ impl Coarsest {
     }
 
     /// x = A⁻¹ b with the factors.
-    pub fn solve(&mut self, b: &[Padded], x: &mut [Padded]) {
+    pub(super) fn solve(&mut self, b: &[Padded], x: &mut [Padded]) {
         self.factorise();
         for (r, b) in self.r.iter_mut().zip(b) {
             *r = Vector3::new(f64::from(b[0]), f64::from(b[1]), f64::from(b[2]));

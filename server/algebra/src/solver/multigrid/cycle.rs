@@ -113,7 +113,7 @@ pub struct Multigrid {
 /// Vectors of one level, one entry per vertex. The level that is solved on has its solution outside; finer ones
 /// have scratch for restriction and prolongation alone.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Vectors {
+pub(super) struct Vectors {
     pub(super) inverse: Vec<Inverse3>,
     pub(super) largest: f64,
     pub(super) x: Vec<Padded>,

@@ -12,14 +12,14 @@ use scindo_matter::element::{LANES, Lanes, Vector8, for_eight};
 use crate::operator::cells::{ENTRY, Matrix24};
 
 /// Row c: weights of the new vertices in vertex c.
-pub type Weights = [[f32; 8]; 8];
+pub(super) type Weights = [[f32; 8]; 8];
 
 /// Entries of a packed matrix.
-pub const PACKED: usize = 300;
+pub(super) const PACKED: usize = 300;
 
 /// A packed symmetric matrix: the planes in the order of [`Dense`], of those on the diagonal the upper triangles by
 /// columns.
-pub type Packed = [f32; PACKED];
+pub(super) type Packed = [f32; PACKED];
 
 /// Stiffness of a prescribed inclined direction over the largest one of its vertex: far above the rounding of single
 /// precision, far below what slows corrections.
@@ -29,7 +29,7 @@ const HELD_STIFFNESS: f32 = 1e-3;
 type Plane = [Lanes; 8];
 
 /// A row by components: the entries of all vertices in a register each.
-pub type ByComponent = [Lanes; 3];
+pub(super) type ByComponent = [Lanes; 3];
 
 /// Where each plane begins in a packed matrix.
 const BEGIN: [usize; 6] = [0, 36, 100, 164, 200, 264];
@@ -40,14 +40,14 @@ const COMPONENTS: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2,
 /// A symmetric matrix whose row and column 3 c + i belong to vertex c and component i: the planes xx, xy, xz, yy, yz,
 /// zz. Lane a of column b is the entry of vertices a and b.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Dense([Plane; 6]);
+pub(super) struct Dense([Plane; 6]);
 
 /// The same matrix by the planes xx, yx, zx, yy, zy, zz.
-pub struct Flipped([Plane; 6]);
+pub(super) struct Flipped([Plane; 6]);
 
 impl Dense {
     /// The matrix of these entries, of which the upper triangle is read.
-    pub fn new(entry: impl Fn(usize, usize) -> f32) -> Self {
+    pub(super) fn new(entry: impl Fn(usize, usize) -> f32) -> Self {
         let mut out = Self::default();
         for s in 0..24 {
             (0..=s).for_each(|r| out.set(r, s, entry(r, s)));
@@ -57,7 +57,7 @@ impl Dense {
 
     /// The matrix that `packed` holds.
     #[inline(always)]
-    pub fn unpacked(packed: &Packed) -> Self {
+    pub(super) fn unpacked(packed: &Packed) -> Self {
         let mut out = Self::default();
         for (p, plane) in out.0.iter_mut().enumerate() {
             let mut from = BEGIN[p];
@@ -78,7 +78,7 @@ impl Dense {
 
     /// The entries that determine it.
     #[inline(always)]
-    pub fn packed(&self) -> Packed {
+    pub(super) fn packed(&self) -> Packed {
         let mut out = [0.0; PACKED];
         for (p, plane) in self.0.iter().enumerate() {
             let mut to = BEGIN[p];
@@ -93,14 +93,14 @@ impl Dense {
 
     /// Entry (r, s).
     #[inline(always)]
-    pub fn entry(&self, r: usize, s: usize) -> f32 {
+    pub(super) fn entry(&self, r: usize, s: usize) -> f32 {
         let ((a, i), (b, j)) = ((r / 3, r % 3), (s / 3, s % 3));
         let plane = &self.0[ENTRY[i][j]];
         if i <= j { plane[b].0[a] } else { plane[a].0[b] }
     }
 
     /// Sets entries (r, s) and (s, r).
-    pub fn set(&mut self, r: usize, s: usize, value: f32) {
+    pub(super) fn set(&mut self, r: usize, s: usize, value: f32) {
         let ((a, i), (b, j)) = ((r / 3, r % 3), (s / 3, s % 3));
         let plane = &mut self.0[ENTRY[i][j]];
         if i <= j {
@@ -113,30 +113,30 @@ impl Dense {
 
     /// Row r, which is column r, too.
     #[inline(always)]
-    pub fn row(&self, r: usize) -> [f32; 24] {
+    pub(super) fn row(&self, r: usize) -> [f32; 24] {
         std::array::from_fn(|s| self.entry(r, s))
     }
 
     /// All entries.
-    pub fn rows(&self) -> Rows {
+    pub(super) fn rows(&self) -> Rows {
         std::array::from_fn(|r| self.row(r))
     }
 
     /// The same in double precision.
-    pub fn wide(&self) -> Matrix24 {
+    pub(super) fn wide(&self) -> Matrix24 {
         self.rows().map(|row| row.map(f64::from))
     }
 
     /// The same by planes below the diagonal.
     #[inline(always)]
-    pub fn flipped<V: Vector8>(&self) -> Flipped {
+    pub(super) fn flipped<V: Vector8>(&self) -> Flipped {
         let [xx, xy, xz, yy, yz, zz] = &self.0;
         Flipped([*xx, transposed::<V>(xy), transposed::<V>(xz), *yy, transposed::<V>(yz), *zz])
     }
 
     /// Q A Qᵀ, with the rotation `Q` on every vertex.
     #[inline(always)]
-    pub fn rotated<V: Vector8>(&self, Q: &Matrix3<f32>) -> Self {
+    pub(super) fn rotated<V: Vector8>(&self, Q: &Matrix3<f32>) -> Self {
         let mut out = Self::default();
         rotate::<V, false>(&self.flipped::<V>(), self, Q, &mut out.0);
         out
@@ -144,7 +144,7 @@ impl Dense {
 
     /// The same by planes below the diagonal.
     #[inline(always)]
-    pub fn rotated_flipped<V: Vector8>(&self, Q: &Matrix3<f32>) -> Flipped {
+    pub(super) fn rotated_flipped<V: Vector8>(&self, Q: &Matrix3<f32>) -> Flipped {
         let mut out = Self::default();
         rotate::<V, true>(&self.flipped::<V>(), self, Q, &mut out.0);
         Flipped(out.0)
@@ -152,7 +152,7 @@ impl Dense {
 
     /// Tᵀ A T, where row c of `T` has the weights of the new vertices in the old vertex c.
     #[inline(always)]
-    pub fn carried<V: Vector8>(&self, T: &Weights) -> Self {
+    pub(super) fn carried<V: Vector8>(&self, T: &Weights) -> Self {
         let mut out = self.0;
         for plane in &mut out {
             // Columns, then rows.
@@ -164,7 +164,7 @@ impl Dense {
     }
 
     /// Sets rows and columns of the `fixed` components of vertex `c` to 0.
-    pub fn hold(&mut self, c: usize, fixed: u8) {
+    pub(super) fn hold(&mut self, c: usize, fixed: u8) {
         for (plane, [i, j]) in self.0.iter_mut().zip(COMPONENTS) {
             if fixed >> i & 1 == 1 {
                 plane.iter_mut().for_each(|column| column.0[c] = 0.0);
@@ -177,7 +177,7 @@ impl Dense {
 
     /// Filters the prescribed directions of vertex `c`: A ← P A P + s H, with a small stiffness s that keeps the
     /// block definite whatever single precision makes of P A P. More stiffness only makes corrections smaller.
-    pub fn filter(&mut self, c: usize, held: &Held) {
+    pub(super) fn filter(&mut self, c: usize, held: &Held) {
         let size = (3 * c..3 * c + 3).map(|r| self.entry(r, r)).fold(0.0, f32::max);
         let (P, H) = (held.filter().map(|p| p as f32), held.projection().map(|h| h as f32));
         for s in (0..24).filter(|s| s / 3 != c) {
@@ -191,7 +191,7 @@ impl Dense {
     }
 
     /// Adds `m` to the diagonal of vertex `c`.
-    pub fn add_mass(&mut self, c: usize, m: f32) {
+    pub(super) fn add_mass(&mut self, c: usize, m: f32) {
         for i in 0..3 {
             self.0[ENTRY[i][i]][c].0[c] += m;
         }
@@ -199,7 +199,7 @@ impl Dense {
 
     /// Adds another matrix.
     #[inline(always)]
-    pub fn add<V: Vector8>(&mut self, other: &Self) {
+    pub(super) fn add<V: Vector8>(&mut self, other: &Self) {
         for (column, other) in self.0.as_flattened_mut().iter_mut().zip(other.0.as_flattened()) {
             *column = (V::load(column) + V::load(other)).store();
         }
@@ -207,7 +207,7 @@ impl Dense {
 
     /// Subtracts Xᵀ X, of which these are the rows.
     #[inline(always)]
-    pub fn subtract_square<V: Vector8>(&mut self, X: &[ByComponent]) {
+    pub(super) fn subtract_square<V: Vector8>(&mut self, X: &[ByComponent]) {
         for (plane, [i, j]) in self.0.iter_mut().zip(COMPONENTS) {
             let mut columns = [V::splat(0.0); 8];
             for_eight!(b => {
@@ -226,7 +226,7 @@ impl Dense {
     }
 
     /// Block of vertices `a` and `b`.
-    pub fn block(&self, a: usize, b: usize) -> Matrix3<f32> {
+    pub(super) fn block(&self, a: usize, b: usize) -> Matrix3<f32> {
         Matrix3::from_fn(|i, j| self.entry(3 * a + i, 3 * b + j))
     }
 }
@@ -239,7 +239,7 @@ impl Flipped {
     /// Slot j = c ⊕ `octant` of corner c is a corner of the parent for j = 0, and along each axis whose bit is set in
     /// j it lies in the middle. So T is the product of one factor per axis, each with the weights 1 and ½, ½.
     #[inline(always)]
-    pub fn add_to_parent<V: Vector8>(&self, octant: usize, sum: &mut Dense) {
+    pub(super) fn add_to_parent<V: Vector8>(&self, octant: usize, sum: &mut Dense) {
         let octant = octant & 7;
         for (plane, sum) in self.0.iter().zip(&mut sum.0) {
             let mut columns = *plane;
@@ -353,11 +353,11 @@ fn times_weights<V: Vector8>(columns: &Plane, T: &Weights) -> Plane {
 }
 
 /// All entries of a matrix, row by row: what sweeps over vertices read.
-pub type Rows = [[f32; 24]; 24];
+pub(super) type Rows = [[f32; 24]; 24];
 
 /// A u.
 #[inline]
-pub fn times(A: &Rows, u: &[f32; 24]) -> [f32; 24] {
+pub(super) fn times(A: &Rows, u: &[f32; 24]) -> [f32; 24] {
     let mut out = [0.0; 24];
     // Symmetric: rows are columns, and sums of columns need not wait for each other.
     for (column, u) in A.iter().zip(u) {
@@ -368,24 +368,24 @@ pub fn times(A: &Rows, u: &[f32; 24]) -> [f32; 24] {
 
 /// Rows 3 c … 3 c + 2 of A u.
 #[inline]
-pub fn times_at(A: &Rows, c: usize, u: &[f32; 24]) -> [f32; 3] {
+pub(super) fn times_at(A: &Rows, c: usize, u: &[f32; 24]) -> [f32; 3] {
     [0, 1, 2].map(|i| A[3 * c + i].iter().zip(u).map(|(a, u)| a * u).sum())
 }
 
 /// A u of a packed matrix.
 #[inline]
-pub fn times_packed(A: &Packed, u: &[f32; 24]) -> [f32; 24] {
+pub(super) fn times_packed(A: &Packed, u: &[f32; 24]) -> [f32; 24] {
     times(&Dense::unpacked(A).rows(), u)
 }
 
 /// Rows 3 c … 3 c + 2 of A u of a packed matrix.
 #[inline]
-pub fn rows_packed(A: &Packed, c: usize, u: &[f32; 24]) -> [f32; 3] {
+pub(super) fn rows_packed(A: &Packed, c: usize, u: &[f32; 24]) -> [f32; 3] {
     [0, 1, 2].map(|i| PLACES[3 * c + i].iter().zip(u).map(|(&at, u)| A[usize::from(at)] * u).sum())
 }
 
 /// Places of all entries in a packed matrix, row by row.
-pub const PLACES: [[u16; 24]; 24] = {
+pub(super) const PLACES: [[u16; 24]; 24] = {
     let (mut places, mut k) = ([[0; 24]; 24], 0);
     while k < 576 {
         places[k / 24][k % 24] = at(k / 24, k % 24) as u16;
@@ -400,7 +400,7 @@ const fn triangle(a: usize, b: usize) -> usize {
 }
 
 /// Place of entry (r, s) of a packed matrix.
-pub const fn at(r: usize, s: usize) -> usize {
+pub(super) const fn at(r: usize, s: usize) -> usize {
     let (a, i, b, j) = (r / 3, r % 3, s / 3, s % 3);
     let begin = BEGIN[ENTRY[i][j]];
     if i == j {

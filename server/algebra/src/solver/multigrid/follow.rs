@@ -29,7 +29,7 @@ pub struct LevelChange {
 
 /// The links of a level.
 #[derive(Clone, Copy, Debug)]
-pub enum Links<'a> {
+pub(super) enum Links<'a> {
     /// Those of the leaves of an octree.
     Leaves(&'a Octree),
     /// [`Level::links`].
@@ -127,7 +127,7 @@ impl LevelChange {
 
 impl Level {
     /// Follows a cut of the octree that changed the leaves `changed`, ascending.
-    pub fn follow_leaves(&mut self, octree: &Octree, changed: &[u32]) -> LevelChange {
+    pub(super) fn follow_leaves(&mut self, octree: &Octree, changed: &[u32]) -> LevelChange {
         let known = self.cells.len();
         let new = changed.iter().filter(|&&id| id as usize >= known);
         let origin = new.map(|&id| octree.whole_of(&self.cells, id)).collect();
@@ -188,7 +188,7 @@ impl Level {
 
 /// Lets `coarse` follow the `change` of `fine`, whose cells of side 2^size it merges. `None` if parts have grown
 /// together, which no cut does; the level is then to be made anew.
-pub fn follow_level(
+pub(super) fn follow_level(
     (fine, links, change): (&Level, Links<'_>, &LevelChange),
     step: &mut Step,
     coarse: &mut Level,

@@ -62,7 +62,7 @@ impl Coefficients {
 
 /// What an update of the operators changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Updated {
+pub(super) struct Updated {
     /// The constants; all matrices are new then.
     pub constants: bool,
     /// Some matrix, in the frame of its cell.
@@ -73,7 +73,7 @@ pub struct Updated {
 
 /// The matrices of all levels.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Galerkin {
+pub(super) struct Galerkin {
     pub levels: Vec<LevelMatrices>,
     /// Matrix of every kind of cell; for leaves without mass.
     pub shared: Vec<Dense>,
@@ -100,7 +100,7 @@ pub struct Galerkin {
 
 impl Galerkin {
     /// Room for the matrices of `hierarchy`.
-    pub fn new(hierarchy: &Hierarchy) -> Self {
+    pub(super) fn new(hierarchy: &Hierarchy) -> Self {
         let levels = hierarchy.levels.iter().enumerate().map(|(l, level)| {
             let n = level.cells.len();
             let kinds = &hierarchy.kind_of[l];
@@ -120,7 +120,7 @@ impl Galerkin {
     /// Brings all matrices up to date. `rotation` gives that of a leaf of the octree; merged cells count as cubes
     /// if the rotations of their children differ by at most `tolerance` [rad] from the mean, and stored ones are
     /// computed again when these turned by more than that relative to each other.
-    pub fn update(
+    pub(super) fn update(
         &mut self,
         team: &mut Team,
         hierarchy: &Hierarchy,
@@ -164,12 +164,12 @@ impl Galerkin {
     }
 
     /// The constants of the last update.
-    pub fn coefficients(&self) -> Option<&Coefficients> {
+    pub(super) fn coefficients(&self) -> Option<&Coefficients> {
         self.coefficients.as_ref()
     }
 
     /// Whether the last update had these constants and prescribed directions.
-    pub fn is_made_for(&self, with: &Coefficients, fixed: &[FixedCopy]) -> bool {
+    pub(super) fn is_made_for(&self, with: &Coefficients, fixed: &[FixedCopy]) -> bool {
         self.coefficients.as_ref() == Some(with)
             && fixed.iter().map(|f| (f.copy, f.held)).eq(self.known_fixed.iter().copied())
     }
@@ -357,7 +357,7 @@ impl Galerkin {
     }
 
     /// Bytes in use: all but stored matrices, and these.
-    pub fn memory(&self) -> [usize; 2] {
+    pub(super) fn memory(&self) -> [usize; 2] {
         let of = |level: &LevelMatrices| {
             let own = |s: &Stored| size_of_val(&s.relative[..]) + s.inner.memory();
             let relative: usize = level.stored.iter().map(own).sum();
@@ -376,18 +376,18 @@ impl Galerkin {
     }
 
     /// The matrix of cell `id` of level `l` over the vertices that carry it, in its frame, with all of its mass.
-    pub fn cell_matrix(&self, hierarchy: &Hierarchy, l: usize, id: usize) -> Dense {
+    pub(super) fn cell_matrix(&self, hierarchy: &Hierarchy, l: usize, id: usize) -> Dense {
         cell_matrix(hierarchy, (l, id), &self.levels[l], &self.shared, &self.eighth)
     }
 
     /// Vertices with prescribed directions, and which directions these are, on the level that is solved on.
-    pub fn held(&self) -> &[(u32, Held)] {
+    pub(super) fn held(&self) -> &[(u32, Held)] {
         if self.first == 0 { &self.known_fixed } else { &self.held }
     }
 
     /// Prescribed directions of vertex `v` of the finest level, one bit each.
     #[cfg(test)]
-    pub fn fixed(&self, v: u32) -> u8 {
+    pub(super) fn fixed(&self, v: u32) -> u8 {
         self.fixed[v as usize]
     }
 }

@@ -12,7 +12,7 @@ use super::step::Step;
 use super::transfer::{MOST_VERTICES, Transfer};
 
 /// Coarsening ends at this number of unknowns.
-pub const COARSE_ENOUGH: usize = 3_000;
+pub(super) const COARSE_ENOUGH: usize = 3_000;
 /// Coarsening ends where a level keeps more than this share of the vertices and no larger cells wait to be merged.
 const STALLED: f64 = 0.9;
 
@@ -54,7 +54,7 @@ struct Limits {
 
 /// Cubes with the same matrix up to their rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-pub struct Kind {
+pub(super) struct Kind {
     /// Number of the material.
     pub material: u16,
     /// Its side is 2^side finest cells.

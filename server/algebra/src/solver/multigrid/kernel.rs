@@ -36,7 +36,7 @@ const UPPER: [u16; STORED] = {
 
 /// The cells of a level, arranged for the kernels by the first update.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct LevelKernel {
+pub(super) struct LevelKernel {
     simd: Simd,
     /// What a matrix of a cell's own is held as.
     stored: LaneMatrix,
@@ -56,7 +56,7 @@ pub struct LevelKernel {
 impl LevelKernel {
     /// No cells yet: which of them have a matrix of their own is known at the first update. If these are to be `half`,
     /// they are rounded to half precision; products take half the time then.
-    pub fn new(simd: Simd, half: bool) -> Self {
+    pub(super) fn new(simd: Simd, half: bool) -> Self {
         Self {
             simd,
             stored: if half { LaneMatrix::Half } else { LaneMatrix::Stored },
@@ -83,13 +83,18 @@ impl LevelKernel {
     }
 
     /// Takes note of a cut, which the next update follows.
-    pub fn follow_cut(&mut self, change: &LevelChange) {
+    pub(super) fn follow_cut(&mut self, change: &LevelChange) {
         self.origin.extend_from_slice(&change.origin);
         self.cut.extend_from_slice(&change.moved);
     }
 
     /// Follows an update of the matrices of level `l`; `anew` if those of the kinds changed.
-    pub fn follow(&mut self, team: &mut Team, level: &Level, (galerkin, l, anew): (&Galerkin, usize, bool)) {
+    pub(super) fn follow(
+        &mut self,
+        team: &mut Team,
+        level: &Level,
+        (galerkin, l, anew): (&Galerkin, usize, bool),
+    ) {
         if self.fresh {
             self.arrange(level, &galerkin.levels[l]);
         }
@@ -150,7 +155,7 @@ impl LevelKernel {
     }
 
     /// Bytes in use: all but stored matrices, and these.
-    pub fn memory(&self) -> [usize; 2] {
+    pub(super) fn memory(&self) -> [usize; 2] {
         let [operator, stored] = self.operator.memory();
         let lists = size_of_val(&self.arranged[..]) + size_of_val(&self.moved[..]);
         [operator + lists, stored]
@@ -158,7 +163,7 @@ impl LevelKernel {
 
     /// Inverses of the diagonal blocks of A, with the lumped `mass` of every vertex; 0 in directions without
     /// stiffness and mass.
-    pub fn invert_diagonal(&mut self, team: &mut Team, mass: &[f32], out: &mut [Inverse3]) {
+    pub(super) fn invert_diagonal(&mut self, team: &mut Team, mass: &[f32], out: &mut [Inverse3]) {
         self.operator.update_diagonals(team);
         let operator = &self.operator;
         team.for_blocks(blocks(out, BLOCK), |block, out| {
@@ -176,7 +181,7 @@ impl LevelKernel {
 
     /// A bound from below of the largest eigenvalue of D⁻¹A on the vertices `near`, ascending, with all others held: the
     /// operator of these `cells` around them has changed. `inverse` is D⁻¹.
-    pub fn largest_near(
+    pub(super) fn largest_near(
         &mut self,
         (cells, near): (impl Iterator<Item = u32>, &[u32]),
         (mass, inverse): (&[f32], &[Inverse3]),
@@ -203,20 +208,20 @@ impl LevelKernel {
     }
 
     /// y = A x, with the lumped `mass` of every vertex.
-    pub fn apply(&mut self, team: &mut Team, mass: &[f32], x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn apply(&mut self, team: &mut Team, mass: &[f32], x: &[Padded], y: &mut [Padded]) {
         self.start(team, x);
         let kernel = &*self;
         team.for_blocks(blocks(y, BLOCK), |block, y| kernel.finish(block, mass, block_of(x, block), y));
     }
 
     /// First half of a product with `x`.
-    pub fn start(&mut self, team: &mut Team, x: &[Padded]) {
+    pub(super) fn start(&mut self, team: &mut Team, x: &[Padded]) {
         self.operator.multiply(team, x);
     }
 
     /// Second half: y = A x of the vertices of block number `block`, where `x` has their entries.
     #[inline]
-    pub fn finish(&self, block: usize, mass: &[f32], x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn finish(&self, block: usize, mass: &[f32], x: &[Padded], y: &mut [Padded]) {
         for (y, (x, &mass)) in y.iter_mut().zip(x.iter().zip(block_of(mass, block))) {
             *y = x.map(|x| mass * x);
         }
@@ -226,7 +231,7 @@ impl LevelKernel {
 
 /// The operator of a level, with its stiff springs.
 #[derive(Debug)]
-pub struct LevelSystem<'a> {
+pub(super) struct LevelSystem<'a> {
     /// The cells.
     pub kernel: &'a mut LevelKernel,
     /// Lumped mass of every vertex.
@@ -255,7 +260,7 @@ impl LinearOperator for LevelSystem<'_> {
 }
 
 /// Numbers between −1 and 1 that depend on a vertex: where estimates of eigenvalues start.
-pub fn noise(v: u32) -> Padded {
+pub(super) fn noise(v: u32) -> Padded {
     let number = |k: u32| (v.wrapping_mul(3).wrapping_add(k)).wrapping_mul(2_654_435_761) >> 8;
     [0, 1, 2, 3].map(|k| if k < 3 { number(k) as f32 / (1 << 23) as f32 - 1.0 } else { 0.0 })
 }

@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-10;
 ///
 /// `iterate` is given α and the zᵀr of the iteration before, both 0 at first, and does r ← r − αq, z = D⁻¹r,
 /// p ← z + βp with β the [`factor`] of both, and q = Ap. It returns zᵀr and pᵀq.
-pub fn largest_ritz_value(iterations: usize, mut iterate: impl FnMut(f32, f64) -> [f64; 2]) -> f64 {
+pub(super) fn largest_ritz_value(iterations: usize, mut iterate: impl FnMut(f32, f64) -> [f64; 2]) -> f64 {
     let mut rows = Vec::with_capacity(iterations);
     let mut last = 0.0;
     let (mut alpha, mut before, mut least) = (0.0, 0.0, 0.0);
@@ -36,7 +36,7 @@ pub fn largest_ritz_value(iterations: usize, mut iterate: impl FnMut(f32, f64) -
 }
 
 /// β: zᵀr over the one `before`; 0 at first.
-pub fn factor(product: f64, before: f64) -> f64 {
+pub(super) fn factor(product: f64, before: f64) -> f64 {
     if before > 0.0 { product / before } else { 0.0 }
 }
 

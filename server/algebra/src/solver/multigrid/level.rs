@@ -7,14 +7,14 @@ use scindo_matter::storage::disjoint::{find, join};
 use scindo_matter::storage::jagged::Jagged;
 
 /// No number.
-pub const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// Two cells that share material across a face: the lower one, the upper one, and the axis between them.
-pub type Link = (u32, u32, u8);
+pub(super) type Link = (u32, u32, u8);
 
 /// The cells of one level, and the vertices they rest on.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Level {
+pub(super) struct Level {
     /// Cells; several may be at one position. `cut` is not used.
     pub cells: Vec<Cell>,
     /// Whether each cell is a leaf of the octree and not merged.
@@ -35,7 +35,7 @@ pub struct Level {
 
 /// A coarser level, and what it was made of.
 #[derive(Debug)]
-pub struct Coarsened {
+pub(super) struct Coarsened {
     /// The level.
     pub level: Level,
     /// Its links.
@@ -68,7 +68,7 @@ fn in_order(links: impl Iterator<Item = Link> + Clone, n: usize) -> Vec<Link> {
 
 impl Level {
     /// Bytes in use.
-    pub fn memory(&self) -> usize {
+    pub(super) fn memory(&self) -> usize {
         size_of_val(&self.cells[..])
             + size_of_val(&self.leaf[..])
             + size_of_val(&self.vertices[..])
@@ -78,7 +78,7 @@ impl Level {
     }
 
     /// The finest level: the leaves of an octree, with its vertices.
-    pub fn finest(octree: &Octree) -> (Self, Vec<Link>) {
+    pub(super) fn finest(octree: &Octree) -> (Self, Vec<Link>) {
         let mut links = Vec::new();
         octree.for_links(|low, high, axis| links.push((low, high, axis as u8)));
         let level = Self {
@@ -96,7 +96,7 @@ impl Level {
     ///
     /// Cells of a block become one if links inside the block connect them. Without `duplicates` all cells of a
     /// block become one: the coarse level does not see cuts inside it.
-    pub fn coarsened(&self, links: &[Link], size: u8, duplicates: bool) -> Coarsened {
+    pub(super) fn coarsened(&self, links: &[Link], size: u8, duplicates: bool) -> Coarsened {
         let block = |id: u32| self.cells[id as usize].at.map(|x| x >> (size + 1));
         let merges = |id: u32| self.cells[id as usize].level == size;
         let mut root: Vec<u32> = (0..self.cells.len() as u32).collect();
@@ -215,12 +215,12 @@ impl Level {
     }
 
     /// The corner of cell `id` at the lattice point `p`.
-    pub fn corner_at(&self, id: u32, p: At) -> Option<usize> {
+    pub(super) fn corner_at(&self, id: u32, p: At) -> Option<usize> {
         self.cells[id as usize].corner_at(p)
     }
 
     /// Lists the [slots](Self::slots).
-    pub fn list_slots(&mut self) {
+    pub(super) fn list_slots(&mut self) {
         let vertices = &self.vertices;
         let slots = |visit: &mut dyn FnMut(u32, u32)| {
             (0u32..).zip(vertices.iter().flatten()).for_each(|(slot, &v)| visit(v, slot));
@@ -229,32 +229,32 @@ impl Level {
     }
 
     /// Whether the [slots](Self::slots) are listed.
-    pub fn has_slots(&self) -> bool {
+    pub(super) fn has_slots(&self) -> bool {
         self.slots.len() > 0
     }
 
     /// Where vertex `v` carries cells: cell and corner.
     #[inline]
-    pub fn slots_of(&self, v: usize) -> impl Iterator<Item = (usize, usize)> {
+    pub(super) fn slots_of(&self, v: usize) -> impl Iterator<Item = (usize, usize)> {
         self.slots.get(v).iter().map(|&slot| (slot as usize / 8, slot as usize % 8))
     }
 
     /// Lattice point of vertex `c` of cell `id`.
-    pub fn vertex_point(&self, id: usize, c: usize) -> At {
+    pub(super) fn vertex_point(&self, id: usize, c: usize) -> At {
         let cell = &self.cells[id];
         if self.hanging[id] >> c & 1 == 1 { parent_corner(cell, c) } else { cell.corner(c) }
     }
 }
 
 /// Trilinear weights of the corners of a cell at a point in halves of its side, 0 … 2 along each axis.
-pub fn trilinear(at: [i32; 3]) -> [f32; 8] {
+pub(super) fn trilinear(at: [i32; 3]) -> [f32; 8] {
     std::array::from_fn(|b| {
         (0..3).map(|k| 0.5 * (if b >> k & 1 == 1 { at[k] } else { 2 - at[k] }) as f32).product()
     })
 }
 
 /// Where vertex `c` of the fine cell `id` is in its coarse cell, in halves of the coarse side.
-pub fn place_in(fine: &Level, id: usize, c: usize, coarse: &Cell) -> [i32; 3] {
+pub(super) fn place_in(fine: &Level, id: usize, c: usize, coarse: &Cell) -> [i32; 3] {
     let p = fine.vertex_point(id, c);
     [0, 1, 2].map(|k| (2 * (p[k] - coarse.at[k])) >> coarse.level)
 }

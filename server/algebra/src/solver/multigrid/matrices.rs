@@ -24,13 +24,13 @@ pub(super) struct Within {
 
 impl Within {
     /// At most `angle` [rad], below π.
-    pub fn new(angle: f32) -> Self {
+    pub(super) fn new(angle: f32) -> Self {
         Self { limit: (0.5 * angle).tan().powi(2) }
     }
 
     /// Whether the angle between `a` and `b` is at most this.
     #[inline(always)]
-    pub fn holds(self, a: &Rotation, b: &Rotation) -> bool {
+    pub(super) fn holds(self, a: &Rotation, b: &Rotation) -> bool {
         let between = a.inverse() * b;
         between.imag().norm_squared() <= self.limit * between.w * between.w
     }
@@ -41,7 +41,7 @@ pub(super) const INCLINED: u8 = 8;
 
 /// The matrix of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum CellMatrix {
+pub(super) enum CellMatrix {
     /// That of its kind.
     Shared(u32),
     /// Its number among the stored ones of the level.
@@ -50,7 +50,7 @@ pub enum CellMatrix {
 
 /// A matrix that belongs to one cell.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Stored {
+pub(super) struct Stored {
     /// The cell, or [`NONE`] if the place is free.
     pub cell: u32,
     /// Whether it has to be computed again.
@@ -67,7 +67,7 @@ pub struct Stored {
 
 /// The matrices of one level.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct LevelMatrices {
+pub(super) struct LevelMatrices {
     /// Frame of every cell: its rotation, or the mean one of its children; I where vertices are prescribed in
     /// some directions only.
     pub frame: Vec<Rotation>,

@@ -22,11 +22,11 @@ const CELLS: usize = 64;
 
 /// What every cell adds to its eight vertices.
 #[cfg(test)]
-pub type CellProducts = Vec<[Padded; 8]>;
+pub(super) type CellProducts = Vec<[Padded; 8]>;
 
 /// One level: its cells and their matrices.
 #[derive(Clone, Copy, Debug)]
-pub struct LevelOperator<'a> {
+pub(super) struct LevelOperator<'a> {
     /// The cells.
     pub level: &'a Level,
     /// Their matrices.
@@ -37,7 +37,7 @@ pub struct LevelOperator<'a> {
 
 impl Galerkin {
     /// The operator of level `l`. On the finest level prescribed directions are not filtered out.
-    pub fn operator<'a>(&'a self, level: &'a Level, l: usize) -> LevelOperator<'a> {
+    pub(super) fn operator<'a>(&'a self, level: &'a Level, l: usize) -> LevelOperator<'a> {
         LevelOperator { level, matrices: &self.levels[l], shared: &self.rows }
     }
 }
@@ -45,7 +45,7 @@ impl Galerkin {
 impl LevelOperator<'_> {
     /// y = A x, cell by cell: what the kernels are tested against. `products` is scratch with one entry per cell.
     #[cfg(test)]
-    pub fn apply(&self, team: &mut Team, x: &[Padded], y: &mut [Padded], products: &mut CellProducts) {
+    pub(super) fn apply(&self, team: &mut Team, x: &[Padded], y: &mut [Padded], products: &mut CellProducts) {
         team.for_blocks(blocks(products, CELLS), |block, products| {
             for (i, product) in products.iter_mut().enumerate() {
                 *product = self.product(block * CELLS + i, x);
@@ -114,7 +114,7 @@ impl LevelOperator<'_> {
     }
 
     /// A x at vertex `v` alone.
-    pub fn row(&self, v: usize, x: &[Padded]) -> [f32; 3] {
+    pub(super) fn row(&self, v: usize, x: &[Padded]) -> [f32; 3] {
         let mass = self.matrices.mass[v];
         let mut sum = [0, 1, 2].map(|k| mass * x[v][k]);
         for (id, c) in self.level.slots_of(v) {
@@ -145,7 +145,12 @@ impl LevelOperator<'_> {
     /// Inverses of the diagonal blocks; 0 in directions without stiffness and mass. `fixed` gives the prescribed
     /// directions of a vertex, one bit each. What the kernels are tested against.
     #[cfg(test)]
-    pub fn invert_diagonal(&self, team: &mut Team, fixed: impl Fn(usize) -> u8 + Sync, out: &mut [Inverse3]) {
+    pub(super) fn invert_diagonal(
+        &self,
+        team: &mut Team,
+        fixed: impl Fn(usize) -> u8 + Sync,
+        out: &mut [Inverse3],
+    ) {
         team.for_blocks(blocks(out, BLOCK), |block, out| {
             for (i, out) in out.iter_mut().enumerate() {
                 let v = block * BLOCK + i;
@@ -158,7 +163,7 @@ impl LevelOperator<'_> {
     }
 
     /// Diagonal block of vertex `v`.
-    pub fn diagonal(&self, v: usize) -> Block6 {
+    pub(super) fn diagonal(&self, v: usize) -> Block6 {
         let mut sum = Matrix3::identity() * self.matrices.mass[v];
         for (id, c) in self.level.slots_of(v) {
             let R = matrix(&self.matrices.frame[id]);

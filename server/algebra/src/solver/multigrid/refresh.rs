@@ -15,7 +15,7 @@ use super::matrices::{
 use super::thin::{Equations, Thin, is_thin};
 
 /// What the matrices of level `l` are computed from.
-pub struct Context<'a> {
+pub(super) struct Context<'a> {
     pub hierarchy: &'a Hierarchy,
     pub l: usize,
     pub fine: &'a LevelMatrices,
@@ -31,7 +31,13 @@ pub struct Context<'a> {
 
 impl Context<'_> {
     /// Computes stored matrices of this level, whose cells have these frames, if anything below them changed.
-    pub fn refresh(&self, simd: Simd, stored: &mut [Stored], frame: &[Rotation], with: (Within, bool)) {
+    pub(super) fn refresh(
+        &self,
+        simd: Simd,
+        stored: &mut [Stored],
+        frame: &[Rotation],
+        with: (Within, bool),
+    ) {
         match simd {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: both come from `Simd::detect` only.
@@ -144,7 +150,7 @@ mod avx2 {
     /// # Safety
     /// The machine has AVX2 and FMA.
     #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn refresh(
+    pub(super) unsafe fn refresh(
         context: &Context<'_>,
         stored: &mut [Stored],
         frame: &[Rotation],

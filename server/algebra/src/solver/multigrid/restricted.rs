@@ -4,7 +4,7 @@ use crate::operator::{Block6, Inverse3, Padded, Spring};
 
 /// Springs by the vertices of a level. Prescribed directions make the weights of x, y and z differ.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct RestrictedSprings {
+pub(super) struct RestrictedSprings {
     springs: Vec<Restricted>,
     /// Vertices and weights of all springs, one after the other.
     entries: Vec<(u32, [f32; 3])>,
@@ -22,19 +22,19 @@ struct Restricted {
 
 impl RestrictedSprings {
     /// Forgets all springs.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.springs.clear();
         self.entries.clear();
     }
 
     /// Begins the next spring, without weights.
-    pub fn begin(&mut self, spring: &Spring) {
+    pub(super) fn begin(&mut self, spring: &Spring) {
         let Spring { direction, stiffness, .. } = *spring;
         self.springs.push(Restricted { first: self.entries.len(), direction, stiffness });
     }
 
     /// Adds a weight of vertex `v` to the last spring.
-    pub fn add(&mut self, v: u32, weight: [f32; 3]) {
+    pub(super) fn add(&mut self, v: u32, weight: [f32; 3]) {
         let first = self.springs.last().map_or(0, |spring| spring.first);
         match self.entries[first..].iter_mut().find(|e| e.0 == v) {
             Some((_, known)) => known.iter_mut().zip(weight).for_each(|(known, w)| *known += w),
@@ -43,19 +43,19 @@ impl RestrictedSprings {
     }
 
     /// Sets the weights of prescribed directions, one bit each, to 0.
-    pub fn hold(&mut self, held: &[u8]) {
+    pub(super) fn hold(&mut self, held: &[u8]) {
         for (v, weight) in &mut self.entries {
             (0..3).filter(|k| held[*v as usize] >> k & 1 == 1).for_each(|k| weight[k] = 0.0);
         }
     }
 
     /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.springs.is_empty()
     }
 
     /// Calls `visit` with every vertex of every spring.
-    pub fn for_vertices(&self, visit: impl FnMut(u32)) {
+    pub(super) fn for_vertices(&self, visit: impl FnMut(u32)) {
         self.entries.iter().map(|e| e.0).for_each(visit);
     }
 
@@ -65,7 +65,7 @@ impl RestrictedSprings {
     }
 
     /// y += Σ k PᵀJ JᵀP x.
-    pub fn add_to(&self, x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn add_to(&self, x: &[Padded], y: &mut [Padded]) {
         for s in 0..self.springs.len() {
             let (spring, entries) = self.of(s);
             let mut p = [0.0; 3];
@@ -86,7 +86,7 @@ impl RestrictedSprings {
     }
 
     /// Adds the springs at vertex `v` to its diagonal block.
-    pub fn add_to_block(&self, v: u32, block: &mut Block6) {
+    pub(super) fn add_to_block(&self, v: u32, block: &mut Block6) {
         for s in 0..self.springs.len() {
             let (spring, entries) = self.of(s);
             let Some((_, w)) = entries.iter().find(|e| e.0 == v) else { continue };
@@ -98,7 +98,7 @@ impl RestrictedSprings {
     }
 
     /// k JᵀP D⁻¹ PᵀJ of spring `s`, with the inverse blocks of D.
-    pub fn compliance(&self, s: usize, inverse: impl Fn(u32) -> Inverse3) -> f64 {
+    pub(super) fn compliance(&self, s: usize, inverse: impl Fn(u32) -> Inverse3) -> f64 {
         let (spring, entries) = self.of(s);
         let mut sum = 0.0;
         for &(v, w) in entries {
@@ -121,7 +121,7 @@ impl RestrictedSprings {
     /// # Derivation
     /// For a spring with c vertices S ≤ c D (Cauchy–Schwarz) and S ≤ κ D with κ its [compliance](Self::compliance);
     /// the smaller bound of the sums counts.
-    pub fn raise(&self, known: f64, inverse: impl Fn(u32) -> Inverse3) -> f64 {
+    pub(super) fn raise(&self, known: f64, inverse: impl Fn(u32) -> Inverse3) -> f64 {
         if self.is_empty() {
             return 0.0;
         }

@@ -51,7 +51,7 @@ pub struct Composite {
 
 /// Buffers in which rows of the composed prolongation are made.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct RowBuffers {
+pub(super) struct RowBuffers {
     row: Vec<(u32, f32)>,
     next: Vec<(u32, f32)>,
 }
@@ -310,7 +310,7 @@ impl Composite {
 
 impl RowBuffers {
     /// The vertices of level `level` on which vertex `v` of the finest level rests, and their weights.
-    pub fn of(&mut self, hierarchy: &Hierarchy, v: u32, level: usize) -> &[(u32, f32)] {
+    pub(super) fn of(&mut self, hierarchy: &Hierarchy, v: u32, level: usize) -> &[(u32, f32)] {
         self.row.clear();
         self.row.push((v, 1.0));
         for step in &hierarchy.steps[..level] {

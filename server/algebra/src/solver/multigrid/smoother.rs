@@ -45,7 +45,7 @@ const HIGHEST: u32 = 8;
 
 /// Degree of the Chebyshev smoother `below` levels below the one that is solved on, where it is `degree`; `most` as in
 /// [`Smoother::Chebyshev`].
-pub fn degree_on(below: usize, degree: u8, most: u8) -> u32 {
+pub(super) fn degree_on(below: usize, degree: u8, most: u8) -> u32 {
     let more = (1 << below.min(3)).min(u32::from(most));
     u32::from(degree.max(1)).max(more).min(HIGHEST)
 }
@@ -93,14 +93,14 @@ const WEIGHTS: [&[f64]; HIGHEST as usize] = [
 ];
 
 /// β of step `i` of `degree`; 1 for degrees without a table.
-pub fn weight(degree: u32, i: u32) -> f32 {
+pub(super) fn weight(degree: u32, i: u32) -> f32 {
     let weights = WEIGHTS.get(degree.saturating_sub(1) as usize);
     weights.and_then(|w| w.get(i as usize)).copied().unwrap_or(1.0) as f32
 }
 
 /// Vectors of a smoothing, one entry per vertex.
 #[derive(Debug)]
-pub struct Smoothing<'a> {
+pub(super) struct Smoothing<'a> {
     /// The right-hand side.
     pub b: &'a [Padded],
     /// The solution.
@@ -115,7 +115,7 @@ pub struct Smoothing<'a> {
 
 /// What is smoothed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
+pub(super) enum Stage {
     /// x from 0, and its residual: before the correction.
     Before,
     /// x with the residual r, after the correction d is added to it. Of r nothing is left.
@@ -126,7 +126,7 @@ pub enum Stage {
 
 /// What stands for the diagonal of the operator in a smoother.
 #[derive(Debug)]
-pub struct Diagonal<'a> {
+pub(super) struct Diagonal<'a> {
     /// Inverses of the diagonal blocks of A. At the vertices of stiff springs they may have these or not.
     pub inverse: &'a [Inverse3],
     /// A bound of the largest eigenvalue of D⁻¹A.
@@ -149,7 +149,7 @@ fn step(start: Start, i: u32, degree: u32, largest: f64) -> Step {
 /// Chebyshev steps for A x = b.
 ///
 /// Products with A are subtracted from r, and make the next step, where they are computed: block by block.
-pub fn chebyshev(
+pub(super) fn chebyshev(
     team: &mut Team,
     A: &mut dyn LinearOperator,
     mut diagonal: Diagonal<'_>,
@@ -235,14 +235,20 @@ impl Smoothing<'_> {
 }
 
 /// r ← r − q.
-pub fn subtract(r: &mut [Padded], q: &[Padded]) {
+pub(super) fn subtract(r: &mut [Padded], q: &[Padded]) {
     for (r, q) in r.iter_mut().zip(q) {
         (0..4).for_each(|k| r[k] -= q[k]);
     }
 }
 
 /// A forward Gauss–Seidel sweep on A x = b with factor ω.
-pub fn gauss_seidel(A: &LevelOperator<'_>, inverse: &[Inverse3], b: &[Padded], x: &mut [Padded], omega: f32) {
+pub(super) fn gauss_seidel(
+    A: &LevelOperator<'_>,
+    inverse: &[Inverse3],
+    b: &[Padded],
+    x: &mut [Padded],
+    omega: f32,
+) {
     for v in 0..x.len() {
         let product = A.row(v, x);
         let r = [b[v][0] - product[0], b[v][1] - product[1], b[v][2] - product[2], 0.0];

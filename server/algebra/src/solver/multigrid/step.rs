@@ -7,7 +7,7 @@ use super::transfer::Transfer;
 
 /// What leads from a level to the next coarser one.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Step {
+pub(super) struct Step {
     /// Coarse cell of every fine cell.
     pub parent: Vec<u32>,
     /// Fine cells of every coarse cell, ascending.
@@ -18,7 +18,7 @@ pub struct Step {
 
 impl Step {
     /// Between `fine` and `coarse`, by the coarse cell of every fine one.
-    pub fn new(fine: &Level, coarse: &Level, parent: Vec<u32>) -> Self {
+    pub(super) fn new(fine: &Level, coarse: &Level, parent: Vec<u32>) -> Self {
         let by_parent = |visit: &mut dyn FnMut(u32, u32)| {
             (0u32..).zip(&parent).for_each(|(child, &parent)| visit(parent, child));
         };
@@ -29,7 +29,7 @@ impl Step {
 
     /// Fine cells of coarse cell `id`.
     #[inline]
-    pub fn children_of(&self, id: usize) -> &[u32] {
+    pub(super) fn children_of(&self, id: usize) -> &[u32] {
         self.children.get(id)
     }
 }

@@ -17,7 +17,7 @@ use crate::operator::{Inverse3, Padded, Spring};
 
 /// The columns of U, each as vertices and their weights.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Columns {
+pub(super) struct Columns {
     /// Where each column ends.
     ends: Vec<usize>,
     entries: Vec<(u32, [f64; 3])>,
@@ -25,24 +25,24 @@ pub struct Columns {
 
 impl Columns {
     /// Forgets all columns.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.ends.clear();
         self.entries.clear();
     }
 
     /// Becomes a copy of `other` in the memory that it has.
-    pub fn copy_from(&mut self, other: &Self) {
+    pub(super) fn copy_from(&mut self, other: &Self) {
         self.ends.clone_from(&other.ends);
         self.entries.clone_from(&other.entries);
     }
 
     /// Number of columns.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.ends.len()
     }
 
     /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
 
@@ -51,17 +51,17 @@ impl Columns {
     }
 
     /// Column `j`.
-    pub fn get(&self, j: usize) -> &[(u32, [f64; 3])] {
+    pub(super) fn get(&self, j: usize) -> &[(u32, [f64; 3])] {
         &self.entries[self.first(j)..self.ends[j]]
     }
 
     /// All columns.
-    pub fn iter(&self) -> impl Iterator<Item = &[(u32, [f64; 3])]> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &[(u32, [f64; 3])]> {
         (0..self.len()).map(|j| self.get(j))
     }
 
     /// The columns of `springs`; `free` leaves out the prescribed directions of a vertex.
-    pub fn set(&mut self, springs: &[Spring], free: impl Fn(u32, [f64; 3]) -> [f64; 3]) {
+    pub(super) fn set(&mut self, springs: &[Spring], free: impl Fn(u32, [f64; 3]) -> [f64; 3]) {
         self.clear();
         for spring in springs {
             let directions = match spring.direction {
@@ -81,7 +81,7 @@ impl Columns {
 
     /// PᵀU of the columns of the next finer level. `inner` calls a function with the coarse vertices and the blocks of
     /// P of a fine vertex that come to its trilinear weights.
-    pub fn restrict(
+    pub(super) fn restrict(
         &mut self,
         fine: &Self,
         P: &Transfer,
@@ -120,7 +120,7 @@ impl Columns {
     }
 
     /// y += U Uᵀx.
-    pub fn add_to(&self, x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn add_to(&self, x: &[Padded], y: &mut [Padded]) {
         for j in 0..self.len() {
             let column = self.get(j);
             let along: f64 = column.iter().map(|(v, u)| dot(u, &wide(&x[*v as usize]))).sum();
@@ -133,7 +133,7 @@ impl Columns {
 
 /// (D + S)⁻¹ on the vertices of the springs of a level.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct SpringBlocks {
+pub(super) struct SpringBlocks {
     /// Ascending.
     vertices: Vec<u32>,
     /// D⁻¹ there.
@@ -145,14 +145,14 @@ pub struct SpringBlocks {
 
 /// Springs of a level: U and (D + U Uᵀ)⁻¹.
 #[derive(Debug)]
-pub struct Sprung<'a> {
+pub(super) struct Sprung<'a> {
     pub columns: &'a Columns,
     pub blocks: &'a mut SpringBlocks,
 }
 
 impl SpringBlocks {
     /// Prepares (D + U Uᵀ)⁻¹; `inverse` gives D⁻¹ of a vertex. Returns whether it exists.
-    pub fn prepare(&mut self, columns: &Columns, inverse: impl Fn(u32) -> Inverse3) -> bool {
+    pub(super) fn prepare(&mut self, columns: &Columns, inverse: impl Fn(u32) -> Inverse3) -> bool {
         columns.list_vertices(&mut self.vertices);
         self.inverse.clear();
         self.inverse.extend(self.vertices.iter().map(|&v| inverse(v)));
@@ -162,7 +162,7 @@ impl SpringBlocks {
     }
 
     /// Calls `visit` with every vertex of the springs and the difference of (D + S)⁻¹r to `M` r there.
-    pub fn correct(
+    pub(super) fn correct(
         &mut self,
         columns: &Columns,
         (M, r): (&[Inverse3], &[Padded]),

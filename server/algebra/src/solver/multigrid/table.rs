@@ -8,7 +8,7 @@ use super::dense::Dense;
 /// M₀ = I/8; merging eight cubes with the trilinear weights T_c of their corners gives Σ T_cᵀ (M/8) T_c. All of these
 /// are products over the axes. Along one axis the mass is (a, ½ − a; ½ − a, a) with a = ½ at first, and merging two
 /// lines gives a ← (a + 1)/4.
-pub fn merged_mass(merged: u8) -> [[f64; 8]; 8] {
+pub(super) fn merged_mass(merged: u8) -> [[f64; 8]; 8] {
     let same = (0..merged).fold(0.5, |a, _| 0.25 * (a + 1.0));
     let entry = |a: usize, b: usize| -> f64 {
         (0..3).map(|k| if (a ^ b) >> k & 1 == 0 { same } else { 0.5 - same }).product()
@@ -17,7 +17,7 @@ pub fn merged_mass(merged: u8) -> [[f64; 8]; 8] {
 }
 
 /// `stiffness` · K + `mass` · M in single precision, for K of side 1.
-pub fn cube(K: &[[f64; 24]; 24], stiffness: f64, M: Option<&[[f64; 8]; 8]>, mass: f64) -> Dense {
+pub(super) fn cube(K: &[[f64; 24]; 24], stiffness: f64, M: Option<&[[f64; 8]; 8]>, mass: f64) -> Dense {
     Dense::new(|r, s| {
         let inertia = M.filter(|_| r % 3 == s % 3).map_or(0.0, |M| mass * M[r / 3][s / 3]);
         (stiffness * K[r][s] + inertia) as f32

@@ -46,7 +46,7 @@ const PIVOT: f32 = 1e-4;
 
 /// Inner vertices of a thin cell, and D.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Inner {
+pub(super) struct Inner {
     /// Fine vertices.
     pub(super) vertices: Vec<u32>,
     /// Rows of D in the frame of the coarse cell, three for each vertex, over the vertices that carry the cell.
@@ -54,22 +54,22 @@ pub struct Inner {
 }
 
 /// Room for what passes between the vertices of a thin cell.
-pub type Passed = [Padded; INNER];
+pub(super) type Passed = [Padded; INNER];
 
 impl Inner {
     /// Forgets all.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.vertices.clear();
         self.change.clear();
     }
 
     /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.vertices.is_empty()
     }
 
     /// Bytes in use.
-    pub fn memory(&self) -> usize {
+    pub(super) fn memory(&self) -> usize {
         size_of_val(&self.vertices[..]) + size_of_val(&self.change[..])
     }
 
@@ -80,7 +80,7 @@ impl Inner {
 }
 
 /// Whether cell `id` is merged and has no neighbours on both sides of an axis.
-pub fn is_thin(level: &Level, id: usize) -> bool {
+pub(super) fn is_thin(level: &Level, id: usize) -> bool {
     if level.leaf[id] || level.hanging[id] != 0 {
         return false;
     }
@@ -94,7 +94,7 @@ fn bit(place: [i32; 3]) -> u32 {
 }
 
 /// Room for the equations of the inner vertices of one cell after the other.
-pub struct Equations {
+pub(super) struct Equations {
     /// A_ii, of which the upper triangle is used.
     A: [[Lanes; ROW]; UNKNOWNS],
     /// (A W)_i: a register of the cell's corners for every component.
@@ -108,7 +108,7 @@ impl Default for Equations {
 }
 
 /// The inner vertices of a cell.
-pub struct Thin<'a> {
+pub(super) struct Thin<'a> {
     vertices: [u32; VERTICES],
     /// Trilinear weights of the cell's corners.
     weights: [Lanes; VERTICES],
@@ -123,7 +123,7 @@ pub struct Thin<'a> {
 impl<'a> Thin<'a> {
     /// Those of thin cell `id` of `coarse`; `is_held` tells which fine vertices are held in some direction. `None` if
     /// it has such, if it has no inner vertices, or if its children rest on others than their corners.
-    pub fn new(
+    pub(super) fn new(
         (fine, coarse): (&Level, &Level),
         step: &Step,
         id: usize,
@@ -193,7 +193,7 @@ impl<'a> Thin<'a> {
 
     /// Adds the matrix of a child, in the frame of the cell.
     #[inline(always)]
-    pub fn add<V: Vector8>(&mut self, fine: &Level, child: usize, A: &Dense) {
+    pub(super) fn add<V: Vector8>(&mut self, fine: &Level, child: usize, A: &Dense) {
         let places = fine.vertices[child].map(|v| self.vertices.iter().position(|w| *w == v).unwrap_or(0));
         for (c, &place) in places.iter().enumerate() {
             (0..3).for_each(|k| self.diagonal[place][k] += A.entry(3 * c + k, 3 * c + k));
@@ -223,7 +223,7 @@ impl<'a> Thin<'a> {
     /// vertices if A_ii is not positive definite, or if another vertex has no stiffness because it rests on held ones:
     /// what moves that alone would then have none either.
     #[inline(always)]
-    pub fn relax<V: Vector8>(self, sum: &mut Dense, inner: &mut Inner) {
+    pub(super) fn relax<V: Vector8>(self, sum: &mut Dense, inner: &mut Inner) {
         if self.diagonal[..self.known].iter().flatten().any(|d| *d <= 0.0) {
             return;
         }

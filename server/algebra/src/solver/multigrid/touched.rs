@@ -15,7 +15,7 @@ use super::thin::is_thin;
 impl Galerkin {
     /// Follows a cut that made these `changes` to the levels of `hierarchy`, whose transfers may still have to follow it.
     /// [`hold_coarse`](Self::hold_coarse) comes next.
-    pub fn follow(&mut self, hierarchy: &Hierarchy, changes: &[LevelChange]) {
+    pub(super) fn follow(&mut self, hierarchy: &Hierarchy, changes: &[LevelChange]) {
         self.fixed.resize(hierarchy.n_vertices(), 0);
         if self.first > 0 {
             self.held_bits.resize(hierarchy.levels[self.first].n_vertices, 0);

@@ -17,7 +17,7 @@ const PARTS: f32 = 32.0;
 /// Bits of an entry that hold its weight.
 const WEIGHT_BITS: u32 = 5;
 /// Vertices of a level that has coarser ones, at most: the other bits hold their numbers.
-pub const MOST_VERTICES: usize = 1 << (u32::BITS - WEIGHT_BITS);
+pub(super) const MOST_VERTICES: usize = 1 << (u32::BITS - WEIGHT_BITS);
 
 /// A vertex and its weight, exactly: number · 32 + 32 · weight − 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -43,7 +43,7 @@ impl Entry {
 
 /// P by rows and by columns.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Transfer {
+pub(super) struct Transfer {
     rows: Jagged<Entry>,
     columns: Jagged<Entry>,
 }
@@ -61,7 +61,7 @@ fn sum(list: &[Entry], v: &[Padded]) -> Padded {
 
 impl Transfer {
     /// P from `coarse` to `fine`, whose cell i belongs to the coarse cell `parent[i]`.
-    pub fn new(fine: &Level, coarse: &Level, parent: &[u32]) -> Self {
+    pub(super) fn new(fine: &Level, coarse: &Level, parent: &[u32]) -> Self {
         // One cell and corner for every vertex.
         let mut home = vec![NONE; fine.n_vertices];
         for (slot, &v) in (0u32..).zip(fine.vertices.iter().flatten()) {
@@ -89,7 +89,13 @@ impl Transfer {
     }
 
     /// Follows a cut that moved the fine `cells`, or the coarse ones that they belong to.
-    pub fn follow(&mut self, fine: &Level, coarse: &Level, parent: &[u32], cells: impl Iterator<Item = u32>) {
+    pub(super) fn follow(
+        &mut self,
+        fine: &Level,
+        coarse: &Level,
+        parent: &[u32],
+        cells: impl Iterator<Item = u32>,
+    ) {
         self.rows.grow(fine.n_vertices);
         self.columns.grow(coarse.n_vertices);
         let mut moved = Bits::new(fine.cells.len());
@@ -119,28 +125,28 @@ impl Transfer {
 
     /// Fine vertices that rest on coarse vertex `v`, and their weights.
     #[cfg(test)]
-    pub fn column(&self, v: usize) -> impl ExactSizeIterator<Item = (u32, f32)> {
+    pub(super) fn column(&self, v: usize) -> impl ExactSizeIterator<Item = (u32, f32)> {
         self.columns.get(v).iter().map(|e| (e.vertex(), e.weight()))
     }
 
     /// Number of fine vertices.
     #[cfg(test)]
-    pub fn n_rows(&self) -> usize {
+    pub(super) fn n_rows(&self) -> usize {
         self.rows.len()
     }
 
     /// Coarse vertices of fine vertex `v`, and their weights.
-    pub fn row(&self, v: usize) -> impl ExactSizeIterator<Item = (u32, f32)> {
+    pub(super) fn row(&self, v: usize) -> impl ExactSizeIterator<Item = (u32, f32)> {
         self.rows.get(v).iter().map(|e| (e.vertex(), e.weight()))
     }
 
     /// Bytes in use.
-    pub fn memory(&self) -> usize {
+    pub(super) fn memory(&self) -> usize {
         self.rows.memory() + self.columns.memory()
     }
 
     /// x = P e.
-    pub fn prolong(&self, team: &mut Team, e: &[Padded], x: &mut [Padded]) {
+    pub(super) fn prolong(&self, team: &mut Team, e: &[Padded], x: &mut [Padded]) {
         team.for_blocks(blocks(x, BLOCK), |block, x| {
             for (i, x) in x.iter_mut().enumerate() {
                 *x = sum(self.rows.get(block * BLOCK + i), e);
@@ -149,7 +155,7 @@ impl Transfer {
     }
 
     /// b = Pᵀ r.
-    pub fn restrict(&self, team: &mut Team, r: &[Padded], b: &mut [Padded]) {
+    pub(super) fn restrict(&self, team: &mut Team, r: &[Padded], b: &mut [Padded]) {
         team.for_blocks(blocks(b, BLOCK), |block, b| {
             for (i, b) in b.iter_mut().enumerate() {
                 *b = sum(self.columns.get(block * BLOCK + i), r);
@@ -159,7 +165,7 @@ impl Transfer {
 }
 
 /// Weights of the vertices of coarse cell `parent` in vertex `c` of the fine cell `id`.
-pub fn carriers(
+pub(super) fn carriers(
     fine: &Level,
     coarse: &Level,
     parent: u32,

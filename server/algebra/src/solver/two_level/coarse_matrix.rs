@@ -19,7 +19,7 @@ const LEAST: f64 = 1e-12;
 
 /// Lower triangle of A_c, masses and factors.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct CoarseMatrix {
+pub(super) struct CoarseMatrix {
     /// Row i has its columns j ≤ i.
     matrix: BlockCsr<f64>,
     /// Coarse mass [kg] of every block, the same along all axes.
@@ -37,7 +37,7 @@ type Row = SmallVec<[(u32, f64); 32]>;
 
 impl CoarseMatrix {
     /// A matrix with the pattern of `matrix`, for nodes with these masses [kg]. `None` without memory for its factors.
-    pub fn new(matrix: BlockCsr<f64>, interpolation: &Interpolation, mass: &[f64]) -> Option<Self> {
+    pub(super) fn new(matrix: BlockCsr<f64>, interpolation: &Interpolation, mass: &[f64]) -> Option<Self> {
         let mut cholesky = Cholesky::default();
         cholesky.analyse(&matrix).ok()?;
         let mut coarse_mass = vec![0.0; matrix.blocks.len()];
@@ -64,12 +64,12 @@ impl CoarseMatrix {
     }
 
     /// Whether there are factors.
-    pub fn is_factored(&self) -> bool {
+    pub(super) fn is_factored(&self) -> bool {
         self.factored
     }
 
     /// A_c = factor M.
-    pub fn begin(&mut self, mass_factor: f64) {
+    pub(super) fn begin(&mut self, mass_factor: f64) {
         for (block, mass) in self.matrix.blocks.iter_mut().zip(&self.mass) {
             *block = [0.0; 9];
             [0, 4, 8].iter().for_each(|&k| block[k] = mass_factor * mass);
@@ -77,12 +77,12 @@ impl CoarseMatrix {
     }
 
     /// The blocks, to be added to.
-    pub fn blocks_mut(&mut self) -> &mut [[f64; 9]] {
+    pub(super) fn blocks_mut(&mut self) -> &mut [[f64; 9]] {
         &mut self.matrix.blocks
     }
 
     /// Adds springs and held directions.
-    pub fn add_springs(&mut self, interpolation: &Interpolation, system: &CoarseSystem<'_>) {
+    pub(super) fn add_springs(&mut self, interpolation: &Interpolation, system: &CoarseSystem<'_>) {
         let mut row = Row::new();
         for fixed in system.fixed {
             let d = &system.diagonal[fixed.copy as usize];
@@ -118,7 +118,7 @@ impl CoarseMatrix {
     }
 
     /// Factorises the matrix.
-    pub fn factorise(&mut self) {
+    pub(super) fn factorise(&mut self) {
         let last = |i: usize, matrix: &BlockCsr<f64>| matrix.row(i).end - 1; // the diagonal block
         let mut largest = 0.0_f64;
         for (i, known) in self.diagonal.iter_mut().enumerate() {
@@ -142,7 +142,7 @@ impl CoarseMatrix {
     }
 
     /// u = A_c⁻¹ b; 0 without factors.
-    pub fn solve(&mut self, b: &[Padded], u: &mut [Padded]) {
+    pub(super) fn solve(&mut self, b: &[Padded], u: &mut [Padded]) {
         // Single precision could not hold the forces of a very heavy or a very light body.
         let scale = b.iter().flatten().fold(0.0_f32, |most, b| most.max(b.abs()));
         if !(self.factored && scale > 0.0 && scale.is_finite()) {

@@ -8,7 +8,7 @@ use super::lattice::{Lattice, weights};
 use crate::operator::Padded;
 
 /// Calls what it is given with the nodes of one element after another.
-pub type ForGroups<'a> = &'a dyn Fn(&mut dyn FnMut(&[u32]));
+pub(super) type ForGroups<'a> = &'a dyn Fn(&mut dyn FnMut(&[u32]));
 
 /// Parts per task of a parallel restriction.
 const PARTS: usize = 16;
@@ -18,7 +18,7 @@ const PARTS: usize = 16;
 /// The nodes of one cell that elements within the cell connect are a *part*. A part has eight corners, and parts of
 /// neighbouring cells share theirs where an element reaches from one to the other.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Interpolation {
+pub(super) struct Interpolation {
     /// Part of every node, and its place in the cell.
     nodes: Vec<Node>,
     /// Coarse unknowns at the corners of every part.
@@ -47,7 +47,7 @@ struct Node {
 impl Interpolation {
     /// The interpolation to nodes at `points` [m]. `for_groups` hands over the nodes of one element after another.
     /// Nodes for which `left_out` holds have weights, but P applies neither to them nor to forces on them.
-    pub fn new(
+    pub(super) fn new(
         lattice: &Lattice,
         points: &[Vector3<f64>],
         (for_groups, left_out): (ForGroups<'_>, &dyn Fn(u32) -> bool),
@@ -111,38 +111,38 @@ impl Interpolation {
     }
 
     /// Number of coarse unknowns.
-    pub fn n_coarse(&self) -> usize {
+    pub(super) fn n_coarse(&self) -> usize {
         self.first_corner.len().saturating_sub(1)
     }
 
     /// Number of parts.
-    pub fn n_parts(&self) -> usize {
+    pub(super) fn n_parts(&self) -> usize {
         self.corners.len()
     }
 
     /// Part of a node.
-    pub fn part(&self, node: u32) -> u32 {
+    pub(super) fn part(&self, node: u32) -> u32 {
         self.nodes[node as usize].part
     }
 
     /// Coarse unknowns at the corners of a part.
-    pub fn corners(&self, part: u32) -> &[u32; 8] {
+    pub(super) fn corners(&self, part: u32) -> &[u32; 8] {
         &self.corners[part as usize]
     }
 
     /// Coarse unknowns at the corners of the part of a node.
-    pub fn corners_of_node(&self, node: u32) -> &[u32; 8] {
+    pub(super) fn corners_of_node(&self, node: u32) -> &[u32; 8] {
         self.corners(self.part(node))
     }
 
     /// Weights of the corners of its part in the displacement of a node.
     #[inline(always)]
-    pub fn weights(&self, node: usize) -> [f32; 8] {
+    pub(super) fn weights(&self, node: usize) -> [f32; 8] {
         weights(self.nodes[node].place)
     }
 
     /// b = Pᵀ r.
-    pub fn restrict(&mut self, team: &mut Team, r: &[Padded], b: &mut [Padded]) {
+    pub(super) fn restrict(&mut self, team: &mut Team, r: &[Padded], b: &mut [Padded]) {
         let Self { nodes, first, members, first_corner, corners_of, at_corners, .. } = self;
         let (nodes, first, members) = (&*nodes, &*first, &*members);
         team.for_blocks(blocks(at_corners, PARTS), |block, at_corners| {
@@ -166,7 +166,7 @@ impl Interpolation {
     }
 
     /// Takes the coarse displacements `u` for [`displacement`](Self::displacement).
-    pub fn set(&mut self, u: &[Padded]) {
+    pub(super) fn set(&mut self, u: &[Padded]) {
         for (at, corners) in self.at_corners.iter_mut().zip(&self.corners) {
             *at = corners.map(|c| u[c as usize]);
         }
@@ -174,7 +174,7 @@ impl Interpolation {
 
     /// The interpolated displacement of a node.
     #[inline(always)]
-    pub fn displacement(&self, node: usize) -> Padded {
+    pub(super) fn displacement(&self, node: usize) -> Padded {
         let Node { applied, place, .. } = self.nodes[node];
         self.at_corners.get(applied as usize).map_or([0.0; 4], |corners| interpolate(corners, place))
     }

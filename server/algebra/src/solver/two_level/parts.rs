@@ -15,7 +15,7 @@ const POLAR: (usize, f32) = (5, 1e-3);
 /// All elements of a part take its mean rotation. This is exact for rigid motions and where a part is not bent. A
 /// preconditioner need not be more accurate.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Parts {
+pub(super) struct Parts {
     /// Pairs of coarse unknowns of part p: `first_pair[p]..first_pair[p + 1]`.
     first_pair: Vec<u32>,
     pairs: Vec<Pair>,
@@ -52,7 +52,7 @@ struct Dense {
 
 impl Parts {
     /// Parts of a body with nodes at `rest` [m], and a coarse matrix with their pattern.
-    pub fn new(
+    pub(super) fn new(
         interpolation: &Interpolation,
         (points, material): (&dyn Points, &Material),
         rest: &[Vector3<f64>],
@@ -76,7 +76,7 @@ impl Parts {
     }
 
     /// Finds the mean rotations with the nodes at `x` [m].
-    pub fn rotate(&mut self, x: &[Vector3<f64>]) {
+    pub(super) fn rotate(&mut self, x: &[Vector3<f64>]) {
         for (part, rotation) in self.rotations.iter_mut().enumerate() {
             let nodes = &self.nodes[self.first_node[part] as usize..self.first_node[part + 1] as usize];
             let Some(origin) = nodes.first().map(|share| x[share.node as usize]) else { continue };
@@ -96,7 +96,7 @@ impl Parts {
     }
 
     /// Adds s Σ R K Rᵀ to the blocks of the coarse matrix.
-    pub fn add_to(&self, scale: f64, blocks: &mut [[f64; 9]]) {
+    pub(super) fn add_to(&self, scale: f64, blocks: &mut [[f64; 9]]) {
         for (part, rotation) in self.rotations.iter().enumerate() {
             let R = rotation.to_rotation_matrix().into_inner();
             let pairs = &self.pairs[self.first_pair[part] as usize..self.first_pair[part + 1] as usize];

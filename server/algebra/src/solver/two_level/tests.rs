@@ -43,7 +43,7 @@ impl Points for Tets {
 
 impl Tets {
     fn masses(&self) -> Vec<f64> {
-        self.0.copy_volumes().iter().map(|volume| MATERIAL.density_kg_m3 * volume).collect()
+        self.0.copy_volume().iter().map(|volume| MATERIAL.density_kg_m3 * volume).collect()
     }
 }
 

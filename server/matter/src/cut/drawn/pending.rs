@@ -26,13 +26,13 @@ pub struct PendingFace {
 
 /// Pairs of incision and fragment where the incision may be pending.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Pending {
+pub(crate) struct Pending {
     of: BTreeSet<(u32, u32)>,
 }
 
 impl Pending {
     /// Records whether the incision is pending in fragment `t`.
-    pub fn set(&mut self, incision: u32, t: u32, pending: bool) {
+    pub(crate) fn set(&mut self, incision: u32, t: u32, pending: bool) {
         if pending {
             self.of.insert((incision, t));
         } else if !self.of.is_empty() {
@@ -41,7 +41,7 @@ impl Pending {
     }
 
     /// Fragment `new` was split from `old`. Incisions pending there may now be pending in both.
-    pub fn inherit(&mut self, incisions: &[u32], old: u32, new: u32) {
+    pub(crate) fn inherit(&mut self, incisions: &[u32], old: u32, new: u32) {
         for &incision in incisions {
             if self.of.contains(&(incision, old)) {
                 self.of.insert((incision, new));
@@ -50,20 +50,20 @@ impl Pending {
     }
 
     /// Collects all incisions with something pending, ascending, into `out`.
-    pub fn incisions(&self, out: &mut Vec<u32>) {
+    pub(crate) fn incisions(&self, out: &mut Vec<u32>) {
         out.clear();
         out.extend(self.of.iter().map(|p| p.0));
         out.dedup();
     }
 
     /// The pending faces, ordered by incision and fragment.
-    pub fn faces(&self, body: &Pieces) -> Vec<PendingFace> {
+    pub(crate) fn faces(&self, body: &Pieces) -> Vec<PendingFace> {
         self.of.iter().filter_map(|&(incision, t)| body.face(incision, t)).collect()
     }
 }
 
 /// The state from which pending faces are computed.
-pub struct Pieces<'a> {
+pub(crate) struct Pieces<'a> {
     /// Rest mesh.
     pub mesh: &'a TetMesh,
     /// Fragment mesh.

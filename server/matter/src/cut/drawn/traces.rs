@@ -28,7 +28,7 @@ const SHORT: f64 = 4.0 * SNAP;
 const MOST: usize = 256;
 
 /// Barycentric coordinates on a face, Σ = 1.
-pub type Place = Vector3<f64>;
+pub(crate) type Place = Vector3<f64>;
 
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct Line {
@@ -48,7 +48,7 @@ struct Drawing {
 
 /// A line on a boundary face of a fragment.
 #[derive(Clone, Copy, Debug)]
-pub struct TraceLine {
+pub(crate) struct TraceLine {
     /// The incision.
     pub incision: u32,
     /// The fragment.
@@ -61,7 +61,7 @@ pub struct TraceLine {
 
 /// The bisection of a boundary face.
 #[derive(Clone, Copy, Debug)]
-pub struct Bisection {
+pub(crate) struct Bisection {
     /// The face (4·fragment + slot) before, and afterwards the part at the first end of the edge.
     pub old: u32,
     /// The part at the other end of the edge.
@@ -76,14 +76,14 @@ pub struct Bisection {
 
 /// All lines on boundary faces, keyed by 4·fragment + slot.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Traces {
+pub(crate) struct Traces {
     of_face: BTreeMap<u32, Vec<Drawing>>,
     kin: u32,
 }
 
 impl Traces {
     /// Whether no face has a drawing.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.of_face.is_empty()
     }
 
@@ -100,21 +100,21 @@ impl Traces {
     }
 
     /// Adds a line to the drawing of an incision on a face (4·fragment + slot).
-    pub fn draw(&mut self, face: u32, incision: u32, ends: [Place; 2]) {
+    pub(crate) fn draw(&mut self, face: u32, incision: u32, ends: [Place; 2]) {
         if (ends[1] - ends[0]).norm() > SHORT {
             self.drawing(face, incision).draw(ends);
         }
     }
 
     /// Moves all drawings of a face when the face becomes one of another fragment.
-    pub fn move_face(&mut self, from: u32, to: u32) {
+    pub(crate) fn move_face(&mut self, from: u32, to: u32) {
         if let Some(drawings) = self.of_face.remove(&from) {
             self.of_face.insert(to, drawings);
         }
     }
 
     /// Divides the drawings of a face bisected from a point on one of its edges to the opposite corner.
-    pub fn bisect(&mut self, bisection: &Bisection) {
+    pub(crate) fn bisect(&mut self, bisection: &Bisection) {
         let Bisection { old, new, incision, .. } = *bisection;
         self.drawing(old, incision);
         self.kin += 1;
@@ -131,7 +131,7 @@ impl Traces {
 
     /// Removes the lines on a face along whose edge the incision has opened, and on the other parts of that
     /// face.
-    pub fn open(&mut self, face: u32, incision: u32, fragments: &Fragments) {
+    pub(crate) fn open(&mut self, face: u32, incision: u32, fragments: &Fragments) {
         let known = self.of_face.get(&face).into_iter().flatten().find(|d| d.incision == incision);
         let Some(kin) = known.map(|drawing| drawing.kin) else { return };
         for t in fragments.of_element(fragments.element[face as usize / 4]) {
@@ -150,7 +150,11 @@ impl Traces {
     /// one of three vertices of a face and no longer crosses an edge between them. The blade then left the
     /// face where it came in, so its lines there lie beside the lips and are omitted, unless the path ends
     /// inside the face.
-    pub fn lines(&self, fragments: &Fragments, is_left: impl Fn([u32; 3], u32) -> bool) -> Vec<TraceLine> {
+    pub(crate) fn lines(
+        &self,
+        fragments: &Fragments,
+        is_left: impl Fn([u32; 3], u32) -> bool,
+    ) -> Vec<TraceLine> {
         let mut lines = Vec::new();
         for (&face, drawings) in &self.of_face {
             let (fragment, face) = (face / 4, face as usize % 4);
@@ -253,7 +257,7 @@ fn vertex_at(p: &Place, [a, b, c]: [&FragmentVertex; 3]) -> FragmentVertex {
 
 /// The part of a line, as parameters from 0 to 1, where all given quantities are ≥ 0. Each quantity is linear
 /// along the line and is given at its two ends.
-pub fn part_inside(quantities: impl IntoIterator<Item = [f64; 2]>) -> Option<[f64; 2]> {
+pub(crate) fn part_inside(quantities: impl IntoIterator<Item = [f64; 2]>) -> Option<[f64; 2]> {
     let (mut from, mut to) = (0.0f64, 1.0f64);
     for [p, q] in quantities {
         match (p < 0.0, q < 0.0) {
@@ -268,7 +272,7 @@ pub fn part_inside(quantities: impl IntoIterator<Item = [f64; 2]>) -> Option<[f6
 
 /// The line in which a plane crosses a triangle, from values proportional to the signed distances
 /// of its corners.
-pub fn line_across(side: [f64; 3]) -> Option<[Place; 2]> {
+pub(crate) fn line_across(side: [f64; 3]) -> Option<[Place; 2]> {
     let edges = [(0, 1), (1, 2), (2, 0)].into_iter().filter(|&(i, j)| side[i] * side[j] < 0.0);
     let edges = edges.map(|(i, j)| {
         let mut place = Place::zeros();

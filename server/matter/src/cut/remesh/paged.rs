@@ -5,7 +5,7 @@ const PAGE: usize = 32;
 
 /// Changes to an array that is kept elsewhere, and entries appended to it.
 #[derive(Clone, Debug)]
-pub struct Paged<T> {
+pub(super) struct Paged<T> {
     /// A page is `None` as long as nothing on it has changed.
     pages: Vec<Option<Vec<T>>>,
     len: usize,
@@ -13,34 +13,34 @@ pub struct Paged<T> {
 
 impl<T: Clone> Paged<T> {
     /// No change to an array of this length.
-    pub fn new(len: usize) -> Self {
+    pub(super) fn new(len: usize) -> Self {
         Self { pages: vec![None; len.div_ceil(PAGE)], len }
     }
 
     /// Number of entries, including those appended.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.len
     }
 
     /// Number of entries copied or appended so far.
-    pub fn copied(&self) -> usize {
+    pub(super) fn copied(&self) -> usize {
         self.pages.iter().flatten().map(Vec::len).sum()
     }
 
     /// Entry `i`; `None` if it is as it was.
-    pub fn get(&self, i: u32) -> Option<&T> {
+    pub(super) fn get(&self, i: u32) -> Option<&T> {
         let page = self.pages[i as usize / PAGE].as_ref()?;
         page.get(i as usize % PAGE)
     }
 
     /// Entry `i`, to be changed. `before` gives the entries as they were.
-    pub fn change(&mut self, i: u32, before: impl Fn(u32) -> T) -> &mut T {
+    pub(super) fn change(&mut self, i: u32, before: impl Fn(u32) -> T) -> &mut T {
         let (page, at) = (i as usize / PAGE, i as usize % PAGE);
         &mut self.page(page, before)[at]
     }
 
     /// Appends an entry.
-    pub fn push(&mut self, entry: T, before: impl Fn(u32) -> T) {
+    pub(super) fn push(&mut self, entry: T, before: impl Fn(u32) -> T) {
         let page = self.len / PAGE;
         if page == self.pages.len() {
             self.pages.push(Some(Vec::with_capacity(PAGE)));
@@ -50,7 +50,7 @@ impl<T: Clone> Paged<T> {
     }
 
     /// Removes the last entry, which must have been appended.
-    pub fn pop(&mut self) {
+    pub(super) fn pop(&mut self) {
         if let Some(Some(page)) = self.pages.last_mut() {
             page.pop();
             self.len -= 1;

@@ -9,35 +9,35 @@ use crate::element::MaterialPoint;
 
 /// The edges to divide, each identified by the smaller of its two half-edges.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct DoubledEdges {
+pub(crate) struct DoubledEdges {
     edges: BTreeSet<u32>,
 }
 
 impl DoubledEdges {
     /// The edges in ascending order.
-    pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = u32> + '_ {
         self.edges.iter().copied()
     }
 
     /// Forgets an edge and returns whether it was known.
-    pub fn remove(&mut self, edge: u32) -> bool {
+    pub(crate) fn remove(&mut self, edge: u32) -> bool {
         self.edges.remove(&edge)
     }
 
     /// Records an edge that has to be divided.
-    pub fn insert(&mut self, edge: u32) {
+    pub(crate) fn insert(&mut self, edge: u32) {
         self.edges.insert(edge);
     }
 
     /// Number of edges.
     #[cfg(test)]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.edges.len()
     }
 
     /// Compares all edges around a vertex, each given with the vertex at its other end. Of edges with the
     /// same end the first stays whole.
-    pub fn compare(&mut self, around: &mut [(u32, u32)]) {
+    pub(crate) fn compare(&mut self, around: &mut [(u32, u32)]) {
         around.sort_unstable();
         for same in around.chunk_by(|p, q| p.0 == q.0) {
             self.edges.remove(&same[0].1);
@@ -48,7 +48,7 @@ impl DoubledEdges {
     /// Appends the vertices in the middle of the edges and divides the triangles there. The first part of a
     /// triangle takes its number, the others are appended behind all triangles. `middle` returns the centroid
     /// of corners 3·triangle + k of one triangle, whose vertices it is given.
-    pub fn divide(
+    pub(crate) fn divide(
         &self,
         surface: &mut Surface,
         twin: impl Fn(u32) -> u32,
@@ -91,6 +91,6 @@ impl DoubledEdges {
 }
 
 /// The next half-edge after `h` in its triangle.
-pub fn next(h: u32) -> u32 {
+pub(crate) fn next(h: u32) -> u32 {
     h / 3 * 3 + (h + 1) % 3
 }

@@ -12,7 +12,7 @@ use crate::cut::topology::fragments::NONE;
 use crate::element::MaterialPoint;
 
 /// Where the vertices of the surface lie. Corners are numbered 3·triangle + k.
-pub trait Place {
+pub(crate) trait Place {
     /// Whether a cycle may keep the vertex that `corner` had before the change.
     fn stays(&self, _corner: u32, _cycle: &[u32]) -> bool {
         true
@@ -25,7 +25,7 @@ pub trait Place {
 
 /// Triangles by number. Half-edge 3·triangle + k runs from corner k to the next.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Joined {
+pub(crate) struct Joined {
     /// Opposite of each half-edge, or [`NONE`] while it is open.
     twin: Vec<u32>,
     /// Surface vertex of each corner.
@@ -53,7 +53,7 @@ pub struct Joined {
 
 impl Joined {
     /// Begins a change: undoes the division of doubled edges, so that every triangle is whole again.
-    pub fn begin(&mut self, surface: &mut Surface) {
+    pub(crate) fn begin(&mut self, surface: &mut Surface) {
         self.round += 1;
         self.dirty.clear();
         self.walked.clear();
@@ -69,7 +69,7 @@ impl Joined {
     }
 
     /// Adds a triangle with a tag and three open edges. Returns its number.
-    pub fn add(&mut self, tag: u32, surface: &mut Surface) -> u32 {
+    pub(crate) fn add(&mut self, tag: u32, surface: &mut Surface) -> u32 {
         let t = self.changed.len() as u32;
         self.twin.extend([NONE; 3]);
         self.corner.extend([NONE; 3]);
@@ -81,19 +81,19 @@ impl Joined {
     }
 
     /// Reports that a triangle changed: its vertices are determined anew.
-    pub fn touch(&mut self, t: u32) {
+    pub(crate) fn touch(&mut self, t: u32) {
         if std::mem::replace(&mut self.changed[t as usize], self.round) != self.round {
             self.dirty.push(t);
         }
     }
 
     /// Opposite of a half-edge, or [`NONE`] while it is open.
-    pub fn twin(&self, h: u32) -> u32 {
+    pub(crate) fn twin(&self, h: u32) -> u32 {
         self.twin[h as usize]
     }
 
     /// Separates a half-edge from its opposite.
-    pub fn open(&mut self, h: u32) {
+    pub(crate) fn open(&mut self, h: u32) {
         let twin = std::mem::replace(&mut self.twin[h as usize], NONE);
         if twin != NONE {
             self.doubled.remove(h.min(twin));
@@ -102,7 +102,7 @@ impl Joined {
     }
 
     /// Makes two half-edges opposites of each other.
-    pub fn join(&mut self, g: u32, h: u32) {
+    pub(crate) fn join(&mut self, g: u32, h: u32) {
         if self.twin[g as usize] != h {
             self.open(g);
             self.open(h);
@@ -111,7 +111,7 @@ impl Joined {
     }
 
     /// Opens all edges of a triangle and forgets its vertices.
-    pub fn clear(&mut self, t: u32) {
+    pub(crate) fn clear(&mut self, t: u32) {
         for h in 3 * t..3 * t + 3 {
             self.open(h);
             let old = std::mem::replace(&mut self.corner[h as usize], NONE);
@@ -123,7 +123,7 @@ impl Joined {
 
     /// Removes a triangle whose edges are all open. The last triangle takes its number. Returns the old
     /// number of that one.
-    pub fn remove(&mut self, t: u32, surface: &mut Surface) -> u32 {
+    pub(crate) fn remove(&mut self, t: u32, surface: &mut Surface) -> u32 {
         let last = self.changed.len() as u32 - 1;
         self.dirty.retain(|d| *d != t);
         if t != last {
@@ -157,33 +157,33 @@ impl Joined {
     }
 
     /// Whether a changed triangle still has an open edge.
-    pub fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         self.dirty.iter().flat_map(|&t| 3 * t..3 * t + 3).any(|h| self.twin[h as usize] == NONE)
     }
 
     /// Numbers of triangles, vertices and doubled edges.
     #[cfg(test)]
-    pub fn sizes(&self) -> [usize; 3] {
+    pub(crate) fn sizes(&self) -> [usize; 3] {
         [self.changed.len(), self.representative.len(), self.doubled.len()]
     }
 
     /// Triangles that changed in this round.
-    pub fn touched(&self) -> &[u32] {
+    pub(crate) fn touched(&self) -> &[u32] {
         &self.dirty
     }
 
     /// Surface vertex of a corner.
-    pub fn vertex(&self, corner: u32) -> u32 {
+    pub(crate) fn vertex(&self, corner: u32) -> u32 {
         self.corner[corner as usize]
     }
 
     /// Marks a vertex as up to date for this round. Returns whether it was not yet.
-    pub fn claim(&mut self, vertex: u32) -> bool {
+    pub(crate) fn claim(&mut self, vertex: u32) -> bool {
         std::mem::replace(&mut self.claimed[vertex as usize], self.round) != self.round
     }
 
     /// Determines the vertices around all changed triangles.
-    pub fn number(&mut self, place: &mut impl Place, surface: &mut Surface) {
+    pub(crate) fn number(&mut self, place: &mut impl Place, surface: &mut Surface) {
         let mut cycle = std::mem::take(&mut self.cycle);
         for i in 0..self.dirty.len() {
             for first in 3 * self.dirty[i]..3 * self.dirty[i] + 3 {
@@ -293,7 +293,7 @@ impl Joined {
     }
 
     /// Ends a change: divides doubled edges in the middle and their triangles into fans.
-    pub fn divide_doubled_edges(&self, place: &impl Place, surface: &mut Surface) {
+    pub(crate) fn divide_doubled_edges(&self, place: &impl Place, surface: &mut Surface) {
         self.doubled.divide(surface, |h| self.twin[h as usize], |corners, of| place.middle(corners, of));
     }
 }

@@ -41,7 +41,7 @@ impl Surface {
 }
 
 /// Expresses a fragment vertex by weights on the copies of piece `p`.
-pub fn bind(mesh: &TetMesh, pieces: &PieceTable, p: u32, v: &FragmentVertex) -> MaterialPoint {
+pub(crate) fn bind(mesh: &TetMesh, pieces: &PieceTable, p: u32, v: &FragmentVertex) -> MaterialPoint {
     let piece = &pieces.pieces[p as usize];
     let nodes = &mesh.tets[piece.element as usize];
     let mut copies = v.nodes.map(|node| slot_of(nodes, node).map_or(NONE, |a| piece.copies[a]));

@@ -19,7 +19,7 @@ use crate::cut::topology::fragments::{FragmentVertex, Fragments, NONE};
 use crate::cut::topology::pieces::PieceTable;
 
 /// The state from which the surface follows.
-pub struct Material<'a> {
+pub(crate) struct Material<'a> {
     /// Rest mesh.
     pub mesh: &'a TetMesh,
     /// Fragment mesh.
@@ -30,7 +30,7 @@ pub struct Material<'a> {
 
 /// The changes that a sweep made to the fragments.
 #[derive(Clone, Copy, Debug)]
-pub struct Change<'a> {
+pub(crate) struct Change<'a> {
     /// Fragments that are new, were bisected or had a face opened, each once.
     pub fragments: &'a [u32],
     /// Boundary faces (4·fragment + slot) that moved from one fragment to another, as [from, to] in the order
@@ -42,7 +42,7 @@ pub struct Change<'a> {
 
 /// The boundary faces of the fragments and their adjacency.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct SurfaceBuilder {
+pub(crate) struct SurfaceBuilder {
     /// Boundary faces as 4·fragment + slot of the opposite vertex; triangle f of the surface is face f.
     faces: Vec<u32>,
     /// Index into `faces` per 4·fragment + slot.
@@ -54,7 +54,7 @@ pub struct SurfaceBuilder {
 
 impl SurfaceBuilder {
     /// Builds the surface of a fragment mesh.
-    pub fn build(material: &Material) -> (Self, Surface) {
+    pub(crate) fn build(material: &Material) -> (Self, Surface) {
         let (mut builder, mut surface) = (Self::default(), Surface::default());
         let all: Vec<u32> = (0..material.fragments.tets.len() as u32).collect();
         builder.update(material, &Change { fragments: &all, moved: &[], pieces: &[] }, &mut surface);
@@ -63,7 +63,7 @@ impl SurfaceBuilder {
     }
 
     /// Updates the surface after a change.
-    pub fn update(&mut self, material: &Material, change: &Change, surface: &mut Surface) {
+    pub(crate) fn update(&mut self, material: &Material, change: &Change, surface: &mut Surface) {
         self.joined.begin(surface);
         self.collect_faces(material.fragments, change, surface);
         self.pair_half_edges(material.fragments);
@@ -75,7 +75,7 @@ impl SurfaceBuilder {
     }
 
     /// Faces (4·fragment + slot) next to a lip of this incision, as far as the last update touched the lip.
-    pub fn faces_beside_lips(&self, surface: &Surface, incision: u32) -> impl Iterator<Item = u32> {
+    pub(crate) fn faces_beside_lips(&self, surface: &Surface, incision: u32) -> impl Iterator<Item = u32> {
         let is_lip = move |f: u32| surface.tags[f as usize] == incision;
         let lips = self.joined.touched().iter().filter(move |f| is_lip(**f));
         let beside = lips.flat_map(|f| 3 * f..3 * f + 3).map(|h| self.joined.twin(h) / 3);
@@ -84,21 +84,21 @@ impl SurfaceBuilder {
 
     /// For every half-edge (4·fragment + slot, k) its partner.
     #[cfg(test)]
-    pub fn joints(&self) -> std::collections::BTreeMap<(u32, u32), (u32, u32)> {
+    pub(crate) fn joints(&self) -> std::collections::BTreeMap<(u32, u32), (u32, u32)> {
         let name = |h: u32| (self.faces[h as usize / 3], h % 3);
         (0..3 * self.faces.len() as u32).map(|h| (name(h), name(self.joined.twin(h)))).collect()
     }
 
     /// Numbers of vertices (fans not counted) and of edges that are divided.
     #[cfg(test)]
-    pub fn counts(&self) -> [usize; 2] {
+    pub(crate) fn counts(&self) -> [usize; 2] {
         let [_, vertices, doubled] = self.joined.sizes();
         [vertices, doubled]
     }
 
     /// Surface vertex, and where it should be: fragment and fragment vertex, of every corner.
     #[cfg(test)]
-    pub fn corners(&self, fragments: &Fragments) -> Vec<(u32, (u32, u32))> {
+    pub(crate) fn corners(&self, fragments: &Fragments) -> Vec<(u32, (u32, u32))> {
         let corners = 0..3 * self.faces.len() as u32;
         corners.map(|c| (self.joined.vertex(c), corner_of(&self.faces, fragments, c))).collect()
     }

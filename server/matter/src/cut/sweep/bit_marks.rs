@@ -5,7 +5,7 @@ use crate::storage::reserve::reserved;
 /// Up to eight kinds of marks per item, one bit each. One byte per item keeps the marks of a whole body in
 /// the cache. Clearing costs as much as setting did.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct BitMarks {
+pub(crate) struct BitMarks {
     of: Vec<u8>,
     marked: Vec<u32>,
 }
@@ -13,18 +13,18 @@ pub struct BitMarks {
 impl BitMarks {
     /// Reserves memory for items below `n`, for half as many again, and for an eighth of them marked at a
     /// time.
-    pub fn with_capacity(n: usize) -> Self {
+    pub(crate) fn with_capacity(n: usize) -> Self {
         Self { of: reserved(n + n / 2, 0), marked: reserved(n / 8, 0) }
     }
 
     /// Clears all marks. Items are numbered below `n` from now on.
-    pub fn restart(&mut self, n: usize) {
+    pub(crate) fn restart(&mut self, n: usize) {
         self.marked.drain(..).for_each(|i| self.of[i as usize] = 0);
         self.of.resize(n, 0);
     }
 
     /// Sets `mark` on `i` and returns whether it was not set before.
-    pub fn insert(&mut self, i: u32, mark: u8) -> bool {
+    pub(crate) fn insert(&mut self, i: u32, mark: u8) -> bool {
         let at = i as usize;
         if at >= self.of.len() {
             self.of.resize(at + 1 + at / 8, 0);
@@ -38,25 +38,25 @@ impl BitMarks {
     }
 
     /// Clears `mark` on `i`, which must have been marked before.
-    pub fn remove(&mut self, i: u32, mark: u8) {
+    pub(crate) fn remove(&mut self, i: u32, mark: u8) {
         self.of[i as usize] &= !mark;
     }
 
     /// Whether `mark` is set on `i`, which must have been marked before.
-    pub fn contains(&self, i: u32, mark: u8) -> bool {
+    pub(crate) fn contains(&self, i: u32, mark: u8) -> bool {
         self.of[i as usize] & mark != 0
     }
 }
 
 /// Sorts numbers by setting one bit for each, without comparing any.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Ascending {
+pub(crate) struct Ascending {
     bits: Vec<u64>,
 }
 
 impl Ascending {
     /// Sorts `numbers` and removes duplicates.
-    pub fn sort(&mut self, numbers: &mut Vec<u32>) {
+    pub(crate) fn sort(&mut self, numbers: &mut Vec<u32>) {
         let [mut first, mut end] = [self.bits.len(), 0];
         for &i in numbers.iter() {
             let word = i as usize / 64;

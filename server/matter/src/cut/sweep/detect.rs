@@ -24,14 +24,14 @@ const CANDIDATES_PER_FRAGMENT: usize = 16;
 
 /// Progress of the search for the crossings of a sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Place {
+pub(crate) struct Place {
     triangle: usize,
     candidate: usize,
     touched: usize,
 }
 
 /// The parts of the body that detection reads.
-pub struct Deformed<'a> {
+pub(crate) struct Deformed<'a> {
     /// Rest mesh.
     pub mesh: &'a TetMesh,
     /// Pieces and their copies.
@@ -42,7 +42,7 @@ pub struct Deformed<'a> {
 
 impl Deformed<'_> {
     /// Position [m] of fragment vertex `v`, seen from piece `p`.
-    pub fn vertex(&self, fragments: &Fragments, p: u32, v: u32) -> Vector3<f64> {
+    pub(crate) fn vertex(&self, fragments: &Fragments, p: u32, v: u32) -> Vector3<f64> {
         let piece = &self.pieces.pieces[p as usize];
         let nodes = &self.mesh.tets[piece.element as usize];
         let vertex = &fragments.vertices[v as usize];
@@ -58,7 +58,7 @@ impl Deformed<'_> {
 
 /// Result of the detection, the fragments to examine, and its scratch arrays.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Detector {
+pub(crate) struct Detector {
     /// Fragments that the sweep touches, ascending.
     pub touched: Vec<u32>,
     /// Pieces whose tet may meet the sweep, with the box around it [m].
@@ -83,7 +83,7 @@ pub struct Detector {
 }
 
 /// The state of the fragment mesh in which detection records a sweep.
-pub struct Record<'a> {
+pub(crate) struct Record<'a> {
     /// Fragment mesh. Vertices and faces get marked.
     pub fragments: &'a mut Fragments,
     /// Table of incision sets.
@@ -125,7 +125,7 @@ impl Record<'_> {
 
 impl Detector {
     /// Reserves memory for an uncut body and for what cuts add.
-    pub fn with_capacity(n_nodes: usize, n_elements: usize) -> Self {
+    pub(crate) fn with_capacity(n_nodes: usize, n_elements: usize) -> Self {
         let mut detector = Self { marks: BitMarks::with_capacity(n_elements), ..Self::default() };
         resize_reserving(&mut detector.beyond, n_nodes, 0);
         resize_reserving(&mut detector.node_beyond, n_nodes, 0);
@@ -144,7 +144,7 @@ impl Detector {
     }
 
     /// Copies of those candidate pieces whose bounding box overlaps that of the blade segment.
-    pub fn tets_near(&self, [tip, heel]: &[Vector3<f64>; 2], pieces: &PieceTable) -> Vec<[u32; 4]> {
+    pub(crate) fn tets_near(&self, [tip, heel]: &[Vector3<f64>; 2], pieces: &PieceTable) -> Vec<[u32; 4]> {
         let (from, to) = (tip.inf(heel), tip.sup(heel));
         let overlaps = |(_, low, high): &&(u32, Vector3<f64>, Vector3<f64>)| {
             (0..3).all(|k| from[k] <= high[k] && low[k] <= to[k])
@@ -154,7 +154,7 @@ impl Detector {
 
     /// Finds the pieces whose tet may meet the box between two corners [m]: those whose four corners are not
     /// all beyond the same face of the box. `runs` and the node of every copy rule out most elements early.
-    pub fn find_candidates(
+    pub(crate) fn find_candidates(
         &mut self,
         body: &Deformed,
         (runs, copy_node): (&Runs, &[u32]),
@@ -190,7 +190,7 @@ impl Detector {
     }
 
     /// Starts the search for a sweep among the candidates.
-    pub fn begin(&mut self, fragments: &Fragments) -> Place {
+    pub(crate) fn begin(&mut self, fragments: &Fragments) -> Place {
         self.touched.clear();
         self.sweep_stamp += 1;
         self.marks.restart(fragments.tets.len());
@@ -201,7 +201,7 @@ impl Detector {
     /// Records crossings, vertices on the sheet and faces along it, starting at `place`. Returns `true` when
     /// `touched` is complete, `false` when the budget ran out first. The number of parts has no influence on
     /// the result.
-    pub fn run(
+    pub(crate) fn run(
         &mut self,
         body: &Deformed,
         triangles: &[SweepTriangle],

@@ -60,14 +60,14 @@ const LINE: f64 = 0.05;
 
 /// What blades have covered in pieces that they have not left.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct FrontElements {
+pub(crate) struct FrontElements {
     /// Points at rest [m] on the border of what is covered, per incision (high half of the key) and piece.
     covered: BTreeMap<u64, Vec<Vector3<f64>>>,
 }
 
 /// A sweep and the body that it meets, at the positions at which the sweep began.
 #[derive(Clone, Copy)]
-pub struct Meeting<'a> {
+pub(crate) struct Meeting<'a> {
     /// The body.
     pub body: &'a Deformed<'a>,
     /// What the blade swept.
@@ -78,7 +78,7 @@ pub struct Meeting<'a> {
 
 /// The cut state as far as it is read.
 #[derive(Clone, Copy)]
-pub struct State<'a> {
+pub(crate) struct State<'a> {
     /// Fragment mesh.
     pub fragments: &'a Fragments,
     /// Table of incision sets.
@@ -92,7 +92,7 @@ type Crossing = ([u32; 2], f64);
 
 /// What lies ahead of the blade.
 #[derive(Debug, Default)]
-pub struct Ahead {
+pub(crate) struct Ahead {
     /// Crossings that are missing.
     pub crossings: Vec<Crossing>,
     /// Fragments around the crossed edges.
@@ -102,7 +102,7 @@ pub struct Ahead {
 impl FrontElements {
     /// Remembers what the sweep covers of piece `p`, unless it has separated it, and returns the crossings within `reach`
     /// ahead of that, over the mean length of the element's edges.
-    pub fn look_at(&mut self, p: u32, reach: f64, meeting: &Meeting<'_>, state: State<'_>) -> Ahead {
+    pub(crate) fn look_at(&mut self, p: u32, reach: f64, meeting: &Meeting<'_>, state: State<'_>) -> Ahead {
         let e = meeting.body.pieces.pieces[p as usize].element;
         let key = key(meeting.incision, p);
         if is_parted(e, meeting, state) {
@@ -130,7 +130,13 @@ impl FrontElements {
 
     /// The same between the lips of element `e`, if the incision has parted it: ahead of the blade in the plane of the
     /// lips, among elements that are not parted.
-    pub fn look_between(&mut self, e: u32, reach: f64, meeting: &Meeting<'_>, state: State<'_>) -> Ahead {
+    pub(crate) fn look_between(
+        &mut self,
+        e: u32,
+        reach: f64,
+        meeting: &Meeting<'_>,
+        state: State<'_>,
+    ) -> Ahead {
         let Some(lips) = lips(e, meeting, state) else { return Ahead::default() };
         let pieces = lips.map(|p| meeting.body.pieces.pieces[p as usize].copies);
         let x = [0, 1, 2, 3]
@@ -158,7 +164,7 @@ impl FrontElements {
     }
 
     /// Forgets what the blade of `incision` covers between lips, except in the elements `near` it, in ascending order.
-    pub fn leave(&mut self, incision: u32, near: &[u32]) {
+    pub(crate) fn leave(&mut self, incision: u32, near: &[u32]) {
         let is_old = |key: &u64| {
             let (of, at) = ((key >> 32) as u32, *key as u32);
             of == incision && at & BETWEEN != 0 && near.binary_search(&(at & !BETWEEN)).is_err()

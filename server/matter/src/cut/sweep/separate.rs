@@ -31,7 +31,7 @@ const CHANGED: u8 = 8;
 
 /// Work list and result of a separation.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Separator {
+pub(crate) struct Separator {
     /// Elements with a face opened by this sweep, ascending.
     pub elements: Vec<u32>,
     /// Fragments that were bisected or had a face opened by this sweep.
@@ -60,7 +60,7 @@ pub struct Separator {
 }
 
 /// The state that a separation reads and changes.
-pub struct Sheet<'a> {
+pub(crate) struct Sheet<'a> {
     /// Fragment mesh.
     pub fragments: &'a mut Fragments,
     /// Table of incision sets.
@@ -94,7 +94,7 @@ impl Sheet<'_> {
 
 impl Separator {
     /// Reserves memory for a cut through a body of `n_elements` elements.
-    pub fn with_capacity(n_elements: usize) -> Self {
+    pub(crate) fn with_capacity(n_elements: usize) -> Self {
         let n = n_elements / 8;
         Self {
             elements: reserved(n, 0),
@@ -109,7 +109,7 @@ impl Separator {
 
     /// Separates what the sheet cuts completely, among the `touched` fragments and their neighbours. If it has a `front`,
     /// it first goes on ahead of the blade, by the given reach; `near` are the pieces that the blade may be in.
-    pub fn run(
+    pub(crate) fn run(
         &mut self,
         (touched, near): (&[u32], &[u32]),
         front: Option<(&mut FrontElements, f64, Meeting<'_>)>,

@@ -13,7 +13,7 @@ use crate::mesh::TET_FACES;
 use crate::testing::{Vectors as _, surface_is_closed_and_manifold};
 
 /// Runs all checks.
-pub fn everything(cut: &CutMesh) {
+pub(super) fn everything(cut: &CutMesh) {
     surface_is_closed_and_manifold(cut.surface());
     volumes(cut);
     fragments_conform(cut);
@@ -24,7 +24,7 @@ pub fn everything(cut: &CutMesh) {
 }
 
 /// The tetrahedra of the solid are positive at rest and fill the surface, wherever its copies are.
-pub fn solid_fills_the_surface(cut: &CutMesh) {
+pub(super) fn solid_fills_the_surface(cut: &CutMesh) {
     let solid = cut.solid();
     let SolidCells::Tets(tets) = &solid.cells else { panic!("tetrahedra are filled by tetrahedra") };
     let volumes = |x: &[Vector3<f64>]| -> Vec<f64> {
@@ -55,7 +55,7 @@ pub fn solid_fills_the_surface(cut: &CutMesh) {
 }
 
 /// Fractions sum to one per element, node volumes to those of the mesh, the surface encloses them.
-pub fn volumes(cut: &CutMesh) {
+pub(super) fn volumes(cut: &CutMesh) {
     let mesh = cut.mesh();
     let element_volume = mesh.volumes();
     let total: f64 = element_volume.iter().sum();
@@ -84,7 +84,7 @@ pub fn volumes(cut: &CutMesh) {
 }
 
 /// Fragments have the volume that their weights give, never negative. Neighbours share exactly one face.
-pub fn fragments_conform(cut: &CutMesh) {
+pub(super) fn fragments_conform(cut: &CutMesh) {
     let f = &cut.fragments;
     for t in 0..f.tets.len() {
         let nodes = cut.mesh().tets[f.element[t] as usize];
@@ -128,7 +128,7 @@ impl UnionFind {
 }
 
 /// Pieces are the face-connected parts of an element; copies of a node those of the pieces around it.
-pub fn copies_are_components(cut: &CutMesh) {
+pub(super) fn copies_are_components(cut: &CutMesh) {
     let f = &cut.fragments;
     let mut part = UnionFind((0..f.tets.len()).collect());
     for t in 0..f.tets.len() {
@@ -187,7 +187,7 @@ pub fn copies_are_components(cut: &CutMesh) {
 }
 
 /// However the copies move, all fragments agree on the position of a vertex, and so does the surface.
-pub fn material_hangs_together(cut: &CutMesh) {
+pub(super) fn material_hangs_together(cut: &CutMesh) {
     let f = &cut.fragments;
     let mut random = Rng::with_seed(7);
     let x: Vec<Vector3<f64>> = (0..cut.n_copies()).map(|_| random.vector(1.0)).collect();
@@ -207,7 +207,7 @@ pub fn material_hangs_together(cut: &CutMesh) {
 
 /// The surface kept up to date cut by cut has the same connectivity as one built from the fragments alone,
 /// and its vertices lie where the fragments are.
-pub fn surface_is_that_of_a_new_build(cut: &CutMesh) {
+pub(super) fn surface_is_that_of_a_new_build(cut: &CutMesh) {
     let f = &cut.fragments;
     let (fresh, _) = SurfaceBuilder::build(&Material { mesh: cut.mesh(), fragments: f, pieces: &cut.pieces });
     assert!(fresh.joints() == cut.builder.joints(), "half-edges are paired differently");

@@ -3,7 +3,7 @@
 use super::*;
 
 /// Slab cut from x = −0.1 to `to` in `n` advances, blade along y.
-pub fn advance(body: &mut Body, to: f64, z: f64, n: usize, incision: u32) {
+pub(super) fn advance(body: &mut Body, to: f64, z: f64, n: usize, incision: u32) {
     for k in 0..n {
         let at = |k: usize| -0.1 + (to + 0.1) * k as f64 / n as f64;
         let blade = |x: f64| [v(x, -0.1, z), v(x, 1.1, z)];

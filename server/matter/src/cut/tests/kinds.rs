@@ -5,7 +5,7 @@ use super::*;
 use std::f64::consts::{PI, TAU};
 
 /// Blades parallel to z through points of the unit square, from below the unit cube to above it.
-pub fn upright(points: &[[f64; 2]]) -> Vec<[Vector3<f64>; 2]> {
+pub(super) fn upright(points: &[[f64; 2]]) -> Vec<[Vector3<f64>; 2]> {
     points.iter().map(|p| [v(p[0], p[1], -0.1), v(p[0], p[1], 1.1)]).collect()
 }
 

@@ -52,7 +52,7 @@ impl NewCopy {
 
 /// The copies of all nodes, and the elements around every node.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct CopyTable {
+pub(crate) struct CopyTable {
     /// Mesh node of each copy. Copies 0..n_nodes are the nodes themselves.
     pub node: Vec<u32>,
     /// Σ over pieces of ∫ N_a dV [m³] per copy.
@@ -79,7 +79,7 @@ struct Around {
 
 impl CopyTable {
     /// One copy per node, before [`update`](Self::update) examines the connectivity.
-    pub fn new(mesh: &TetMesh, pieces: &PieceTable) -> Self {
+    pub(crate) fn new(mesh: &TetMesh, pieces: &PieceTable) -> Self {
         let n = mesh.nodes.len();
         let mut volume = vec![0.0; n];
         for (tet, node_volume) in mesh.tets.iter().zip(&pieces.node_volume) {
@@ -96,7 +96,7 @@ impl CopyTable {
     }
 
     /// Reserves memory for cuts through a body of `n_elements` elements.
-    pub fn reserve_half_again(&mut self, n_elements: usize) {
+    pub(crate) fn reserve_half_again(&mut self, n_elements: usize) {
         self.visited.resize(n_elements, 0);
         self.changed = reserved(n_elements / 8, 0);
         reserve_half_again(&mut self.node);
@@ -106,7 +106,13 @@ impl CopyTable {
 
     /// The copies of node `i` whose material contains the node itself, ascending. There is one, or more where
     /// a cut passes exactly through the node and each lip has it.
-    pub fn with_node(&self, mesh: &TetMesh, i: u32, fragments: &Fragments, pieces: &PieceTable) -> Vec<u32> {
+    pub(crate) fn with_node(
+        &self,
+        mesh: &TetMesh,
+        i: u32,
+        fragments: &Fragments,
+        pieces: &PieceTable,
+    ) -> Vec<u32> {
         let mut found = Vec::new();
         for &e in self.around.of(i) {
             let Some(a) = slot_of(&mesh.tets[e as usize], i) else { continue };
@@ -123,12 +129,12 @@ impl CopyTable {
     }
 
     /// The elements around every node.
-    pub fn elements_around(&self) -> &ElementsAround {
+    pub(crate) fn elements_around(&self) -> &ElementsAround {
         &self.around
     }
 
     /// Copies of all pieces that use this copy.
-    pub fn tets_around(&self, copy: u32, pieces: &PieceTable) -> Vec<[u32; 4]> {
+    pub(crate) fn tets_around(&self, copy: u32, pieces: &PieceTable) -> Vec<[u32; 4]> {
         let elements = self.around.of(self.node[copy as usize]);
         let all =
             elements.iter().flat_map(|&e| pieces.of_element(e)).map(|p| pieces.pieces[p as usize].copies);
@@ -136,7 +142,7 @@ impl CopyTable {
     }
 
     /// Recomputes the copies of node `i` and appends the new ones to `new_copies`.
-    pub fn update(
+    pub(crate) fn update(
         &mut self,
         mesh: &TetMesh,
         i: u32,

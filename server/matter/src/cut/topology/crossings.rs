@@ -13,12 +13,12 @@ use std::hash::{BuildHasherDefault, Hasher};
 ///
 /// Two crossings closer than this would make slivers that carry nothing but rounding errors. It is
 /// far above rounding (1e-16) and far below what a blade resolves.
-pub const SNAP: f64 = 1e-6;
+pub(crate) const SNAP: f64 = 1e-6;
 
 /// Multiplicative hash of an edge key. The keys come from this program, so they need no defence against
 /// flooding.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct EdgeHasher(u64);
+pub(crate) struct EdgeHasher(u64);
 
 impl Hasher for EdgeHasher {
     fn finish(&self) -> u64 {
@@ -38,16 +38,16 @@ impl Hasher for EdgeHasher {
 }
 
 /// Set of edge keys.
-pub type EdgeSet = HashSet<u64, BuildHasherDefault<EdgeHasher>>;
+pub(crate) type EdgeSet = HashSet<u64, BuildHasherDefault<EdgeHasher>>;
 
 /// The key of the edge between two vertices, independent of their order.
-pub fn edge_key(a: u32, b: u32) -> u64 {
+pub(crate) fn edge_key(a: u32, b: u32) -> u64 {
     u64::from(a.min(b)) << 32 | u64::from(a.max(b))
 }
 
 /// Crossings of edges that are not separated yet.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Crossings {
+pub(crate) struct Crossings {
     by_edge: HashMap<u64, OfEdge, BuildHasherDefault<EdgeHasher>>,
     /// Per vertex whether an edge at it was ever crossed; vertices beyond the end have none. Most vertices in
     /// question lie on a sheet and have no such edge, which saves a look into the table.
@@ -64,7 +64,7 @@ struct OfEdge {
 
 impl Crossings {
     /// Reserves memory for a cut through a body of `n_nodes` nodes.
-    pub fn with_capacity(n_nodes: usize) -> Self {
+    pub(crate) fn with_capacity(n_nodes: usize) -> Self {
         let mut crossings = Self { at_vertex: vec![false; n_nodes], ..Self::default() };
         crossings.by_edge.reserve(n_nodes / 8);
         reserve_half_again(&mut crossings.at_vertex);
@@ -72,7 +72,7 @@ impl Crossings {
     }
 
     /// Whether any edge at vertex `v` was ever crossed.
-    pub fn reach(&self, v: u32) -> bool {
+    pub(crate) fn reach(&self, v: u32) -> bool {
         self.at_vertex.get(v as usize) == Some(&true)
     }
 
@@ -81,20 +81,20 @@ impl Crossings {
     }
 
     /// Parameter from `a` to `b` at which the incision crosses the edge.
-    pub fn get(&self, a: u32, b: u32, incision: u32) -> Option<f64> {
+    pub(crate) fn get(&self, a: u32, b: u32, incision: u32) -> Option<f64> {
         let OfEdge { first, further } = self.of_edge(a, b)?;
         let t = if first.0 == incision { first.1 } else { further.iter().find(|c| c.0 == incision)?.1 };
         Some(if a < b { t } else { 1.0 - t })
     }
 
     /// All crossings of the edge, with parameters from the vertex with the smaller id.
-    pub fn of(&self, a: u32, b: u32) -> impl Iterator<Item = (u32, f64)> + '_ {
+    pub(crate) fn of(&self, a: u32, b: u32) -> impl Iterator<Item = (u32, f64)> + '_ {
         let found = self.of_edge(a, b);
         found.into_iter().flat_map(|of| std::iter::once(of.first).chain(of.further.iter().copied()))
     }
 
     /// Records a crossing at `t` from `a` to `b`. An earlier crossing by the same incision stays.
-    pub fn insert(&mut self, a: u32, b: u32, incision: u32, t: f64) {
+    pub(crate) fn insert(&mut self, a: u32, b: u32, incision: u32, t: f64) {
         let t = if a < b { t } else { 1.0 - t };
         let last = a.max(b) as usize;
         if last >= self.at_vertex.len() {
@@ -115,7 +115,7 @@ impl Crossings {
     }
 
     /// Gives the edge (new, other) the crossings of the edge (old, other).
-    pub fn inherit(&mut self, old: u32, new: u32, other: u32) {
+    pub(crate) fn inherit(&mut self, old: u32, new: u32, other: u32) {
         let Some(of) = self.of_edge(old, other) else { return };
         let OfEdge { first, further } = of.clone(); // hardly ever with more than nothing in `further`
         for (incision, t) in std::iter::once(first).chain(further) {

@@ -14,17 +14,17 @@ use super::incision_sets::IncisionSets;
 use super::slot::slot_of;
 
 /// Marks a missing neighbour and the end of a list.
-pub const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Most fragments in one element. A bisection that needs more is refused.
 ///
 /// One plane makes at most 6 of 1. A cap of 256 allows some 20 planes through one element, and bounds the
 /// memory of a pathological sweep.
-pub const MAX_FRAGMENTS_PER_ELEMENT: u16 = 256;
+pub(crate) const MAX_FRAGMENTS_PER_ELEMENT: u16 = 256;
 
 /// A point of the material: Σ weights · nodes, where all nodes belong to one element.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct FragmentVertex {
+pub(crate) struct FragmentVertex {
     /// Mesh nodes; [`NONE`] in unused slots, which come last.
     pub nodes: [u32; 4],
     /// Weight of each node, Σ = 1.
@@ -33,12 +33,12 @@ pub struct FragmentVertex {
 
 impl FragmentVertex {
     /// The vertex at a mesh node.
-    pub fn at_node(node: u32) -> Self {
+    pub(crate) fn at_node(node: u32) -> Self {
         Self { nodes: [node, NONE, NONE, NONE], weights: [1.0, 0.0, 0.0, 0.0] }
     }
 
     /// The point (1 − t) a + t b; `a` and `b` must lie in one element.
-    pub fn between(a: &Self, b: &Self, t: f64) -> Self {
+    pub(crate) fn between(a: &Self, b: &Self, t: f64) -> Self {
         let mut v = Self { nodes: a.nodes, weights: a.weights.map(|w| (1.0 - t) * w) };
         for (&node, &weight) in b.nodes.iter().zip(&b.weights) {
             if node == NONE {
@@ -53,14 +53,14 @@ impl FragmentVertex {
     }
 
     /// Weight of mesh node `node`, 0 if the vertex does not depend on it.
-    pub fn weight_of(&self, node: u32) -> f64 {
+    pub(crate) fn weight_of(&self, node: u32) -> f64 {
         slot_of(&self.nodes, node).map_or(0.0, |slot| self.weights[slot])
     }
 }
 
 /// All fragments of a body, structure of arrays.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Fragments {
+pub(crate) struct Fragments {
     /// Vertices, the first n_nodes at the mesh nodes.
     pub vertices: Vec<FragmentVertex>,
     /// Per vertex the set of incisions it lies on.
@@ -95,7 +95,7 @@ pub struct Fragments {
 
 /// The two fragments that the bisection of an edge made of one.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Halves {
+pub(crate) struct Halves {
     /// The half at end `a` of the edge. It keeps the id of the fragment that was split.
     pub old: u32,
     /// The appended half, at end `b`.
@@ -106,7 +106,7 @@ pub struct Halves {
 
 impl Fragments {
     /// One fragment per element of a checked mesh.
-    pub fn new(mesh: &TetMesh) -> Self {
+    pub(crate) fn new(mesh: &TetMesh) -> Self {
         let n = mesh.tets.len();
         let mut fragments = Self {
             vertices: (0..mesh.nodes.len() as u32).map(FragmentVertex::at_node).collect(),
@@ -147,7 +147,7 @@ impl Fragments {
     }
 
     /// Tags boundary faces of the uncut state. `tags` is keyed by their mesh nodes in ascending order.
-    pub fn tag_boundary(&mut self, mesh: &TetMesh, tags: &BTreeMap<[u32; 3], u32>) {
+    pub(crate) fn tag_boundary(&mut self, mesh: &TetMesh, tags: &BTreeMap<[u32; 3], u32>) {
         if tags.is_empty() {
             return;
         }
@@ -161,22 +161,22 @@ impl Fragments {
     }
 
     /// Fragments of element `e`, the first one first.
-    pub fn of_element(&self, e: u32) -> impl Iterator<Item = u32> + '_ {
+    pub(crate) fn of_element(&self, e: u32) -> impl Iterator<Item = u32> + '_ {
         std::iter::successors(Some(e), |&t| Some(self.next_in_element[t as usize]).filter(|&n| n != NONE))
     }
 
     /// Slot of vertex `v` in fragment `t`.
-    pub fn slot(&self, t: u32, v: u32) -> Option<usize> {
+    pub(crate) fn slot(&self, t: u32, v: u32) -> Option<usize> {
         slot_of(&self.tets[t as usize], v)
     }
 
     /// Face of fragment `n` that it shares with `t`.
-    pub fn face_towards(&self, n: u32, t: u32) -> Option<usize> {
+    pub(crate) fn face_towards(&self, n: u32, t: u32) -> Option<usize> {
         slot_of(&self.neighbour[n as usize], t)
     }
 
     /// Collects the fragments around vertex `v` that are face-connected with `t`.
-    pub fn star(&self, t: u32, v: u32, out: &mut Vec<u32>) {
+    pub(crate) fn star(&self, t: u32, v: u32, out: &mut Vec<u32>) {
         out.clear();
         out.push(t);
         let mut k = 0;
@@ -192,7 +192,7 @@ impl Fragments {
     }
 
     /// Collects the fragments around the edge (a, b) that are face-connected with `t`.
-    pub fn wedge(&self, t: u32, a: u32, b: u32, out: &mut Vec<u32>) {
+    pub(crate) fn wedge(&self, t: u32, a: u32, b: u32, out: &mut Vec<u32>) {
         out.clear();
         out.push(t);
         let mut others = self.tets[t as usize].into_iter().filter(|&v| v != a && v != b);
@@ -221,7 +221,7 @@ impl Fragments {
     /// the face of fragment `t` opposite its vertex `face`; the edge runs from its corner `edge` to the next
     /// in the order of [`TET_FACES`]. Returns fragment, face and edge at the far side, where the edge runs
     /// the other way.
-    pub fn around_edge(&self, t: u32, face: usize, edge: usize) -> (u32, usize, usize) {
+    pub(crate) fn around_edge(&self, t: u32, face: usize, edge: usize) -> (u32, usize, usize) {
         let (mut t, corners) = (t as usize, TET_FACES[face]);
         let to = self.tets[t][corners[(edge + 1) % 3]];
         let mut exit = corners[(edge + 2) % 3];
@@ -243,7 +243,7 @@ impl Fragments {
     /// Bisects the edge (a, b) at the new vertex `m` in every fragment of its `wedge`. The faces between the
     /// halves are marked as lying `along` the given set of incisions. `halves` receives one entry per
     /// fragment of the wedge.
-    pub fn bisect(
+    pub(crate) fn bisect(
         &mut self,
         wedge: &[u32],
         ends: [u32; 2],
@@ -308,7 +308,7 @@ impl Fragments {
     }
 
     /// Opens the face of fragment `t` opposite its vertex `face`; both sides get the tag.
-    pub fn open(&mut self, t: u32, face: usize, tag: u32) {
+    pub(crate) fn open(&mut self, t: u32, face: usize, tag: u32) {
         let n = self.neighbour[t as usize][face];
         if n == NONE {
             return;
@@ -324,7 +324,11 @@ impl Fragments {
     /// Restores the rule that only a face-connected star shares a vertex. Of the stars at the given corners
     /// (fragment, slot) the first keeps the vertex, and each other one gets its own. `renamed(fragments, old
     /// vertex, [fragment, new vertex])` is called for every renamed corner.
-    pub fn split_stars(&mut self, corners: &[(u32, u8)], mut renamed: impl FnMut(&Self, u32, [u32; 2])) {
+    pub(crate) fn split_stars(
+        &mut self,
+        corners: &[(u32, u8)],
+        mut renamed: impl FnMut(&Self, u32, [u32; 2]),
+    ) {
         self.stamp += 1;
         self.visited.resize(self.tets.len(), [0; 4]);
         self.claimed.resize(self.vertices.len(), 0);

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// Table of distinct sets. A set is identified by its index here.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct IncisionSets {
+pub(crate) struct IncisionSets {
     sets: Vec<Vec<u32>>,
     /// Per set its member if it has exactly one, else 0, which is no incision.
     only: Vec<u32>,
@@ -25,11 +25,11 @@ impl Default for IncisionSets {
 
 impl IncisionSets {
     /// The empty set.
-    pub const EMPTY: u32 = 0;
+    pub(crate) const EMPTY: u32 = 0;
 
     /// Whether the incision is in the set.
     #[inline]
-    pub fn contains(&self, set: u32, incision: u32) -> bool {
+    pub(crate) fn contains(&self, set: u32, incision: u32) -> bool {
         match set {
             Self::EMPTY => false,
             _ if self.only[set as usize] != 0 => self.only[set as usize] == incision,
@@ -38,7 +38,7 @@ impl IncisionSets {
     }
 
     /// The set with the incision added to it.
-    pub fn with(&mut self, set: u32, incision: u32) -> u32 {
+    pub(crate) fn with(&mut self, set: u32, incision: u32) -> u32 {
         if self.contains(set, incision) {
             return set;
         }
@@ -56,7 +56,7 @@ impl IncisionSets {
     }
 
     /// The intersection of two sets.
-    pub fn both(&mut self, p: u32, q: u32) -> u32 {
+    pub(crate) fn both(&mut self, p: u32, q: u32) -> u32 {
         if p == q || p == Self::EMPTY {
             return p;
         }

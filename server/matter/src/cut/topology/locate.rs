@@ -7,7 +7,7 @@ use crate::mesh::TetMesh;
 use super::fragments::Fragments;
 
 /// The piece of element `e` in which the point with these barycentric coordinates lies deepest.
-pub fn piece_at(mesh: &TetMesh, fragments: &Fragments, e: u32, barycentric: [f64; 4]) -> u32 {
+pub(crate) fn piece_at(mesh: &TetMesh, fragments: &Fragments, e: u32, barycentric: [f64; 4]) -> u32 {
     let point = Vector4::from(barycentric);
     let nodes = mesh.tets[e as usize];
     let depth = |t: u32| {

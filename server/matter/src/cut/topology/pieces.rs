@@ -22,7 +22,7 @@ pub struct Piece {
 
 /// All pieces. Piece e < n_elements is the first of element e; cuts append the others.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct PieceTable {
+pub(crate) struct PieceTable {
     /// The pieces by id. No id ever changes.
     pub pieces: Vec<Piece>,
     /// ∫ N_a dV [m³] over each piece.
@@ -43,7 +43,7 @@ pub struct PieceTable {
 
 impl PieceTable {
     /// One whole piece per element.
-    pub fn new(mesh: &TetMesh) -> Self {
+    pub(crate) fn new(mesh: &TetMesh) -> Self {
         let element_volume = mesh.volumes();
         let mut table = Self {
             pieces: (0u32..)
@@ -70,12 +70,16 @@ impl PieceTable {
     }
 
     /// Pieces of element `e`, the first one first.
-    pub fn of_element(&self, e: u32) -> impl Iterator<Item = u32> + '_ {
+    pub(crate) fn of_element(&self, e: u32) -> impl Iterator<Item = u32> + '_ {
         std::iter::successors(Some(e), |&p| Some(self.next_in_element[p as usize]).filter(|&n| n != NONE))
     }
 
     /// Fragments of piece `p`.
-    pub fn fragments<'a>(&'a self, p: u32, fragments: &'a Fragments) -> impl Iterator<Item = u32> + 'a {
+    pub(crate) fn fragments<'a>(
+        &'a self,
+        p: u32,
+        fragments: &'a Fragments,
+    ) -> impl Iterator<Item = u32> + 'a {
         std::iter::successors(Some(self.first_fragment[p as usize]), |&t| {
             Some(fragments.next_in_piece[t as usize]).filter(|&n| n != NONE)
         })
@@ -84,7 +88,13 @@ impl PieceTable {
     /// Recomputes the pieces of element `e` from its fragments. Components only ever become finer: one
     /// component of an old piece keeps its id, and the others are appended with the same copies. Pieces that
     /// came apart are appended to `changed`, together with the parts that they became.
-    pub fn update(&mut self, mesh: &TetMesh, e: u32, fragments: &mut Fragments, changed: &mut Vec<u32>) {
+    pub(crate) fn update(
+        &mut self,
+        mesh: &TetMesh,
+        e: u32,
+        fragments: &mut Fragments,
+        changed: &mut Vec<u32>,
+    ) {
         let first = changed.len();
         let mut members = std::mem::take(&mut self.members);
         members.clear();
@@ -174,7 +184,7 @@ impl PieceTable {
 
     /// ∫ N_a N_b dV [m³] over piece `p`. A fragment T with corner values N(v) contributes |T|/20 Σ_v Σ_w
     /// N_a(v) N_b(w) (1 + δ_vw).
-    pub fn node_products(&self, mesh: &TetMesh, p: u32, fragments: &Fragments) -> [[f64; 4]; 4] {
+    pub(crate) fn node_products(&self, mesh: &TetMesh, p: u32, fragments: &Fragments) -> [[f64; 4]; 4] {
         let e = self.pieces[p as usize].element as usize;
         let nodes = mesh.tets[e];
         let mut M = [[0.0; 4]; 4];
@@ -194,7 +204,7 @@ impl PieceTable {
     }
 
     /// Rest volume [m³] of piece `p`.
-    pub fn volume(&self, p: usize) -> f64 {
+    pub(crate) fn volume(&self, p: usize) -> f64 {
         let piece = &self.pieces[p];
         piece.fraction * self.element_volume[piece.element as usize]
     }

@@ -8,7 +8,7 @@ const ELEMENTS: usize = 64;
 
 /// The nodes of every run, each once.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Runs {
+pub(crate) struct Runs {
     n_elements: usize,
     nodes: Vec<u32>,
     /// The nodes of run r are [first[r], first[r + 1]).
@@ -17,7 +17,7 @@ pub struct Runs {
 
 impl Runs {
     /// The runs of a mesh. Cuts do not change them.
-    pub fn new(mesh: &TetMesh) -> Self {
+    pub(crate) fn new(mesh: &TetMesh) -> Self {
         let mut runs = Self { n_elements: mesh.tets.len(), nodes: Vec::new(), first: vec![0] };
         let mut last_run = vec![0; mesh.nodes.len()];
         for (tets, run) in mesh.tets.chunks(ELEMENTS).zip(1u32..) {
@@ -33,7 +33,7 @@ impl Runs {
 
     /// The elements of all runs whose nodes are not all beyond the same plane. `beyond` has, per node, one
     /// bit for each plane that the node is beyond.
-    pub fn within_reach<'a>(&'a self, beyond: &'a [u8]) -> impl Iterator<Item = u32> + 'a {
+    pub(crate) fn within_reach<'a>(&'a self, beyond: &'a [u8]) -> impl Iterator<Item = u32> + 'a {
         let runs = self.first.windows(2).enumerate();
         let runs = runs.filter(|(_, bounds)| {
             let nodes = &self.nodes[bounds[0] as usize..bounds[1] as usize];

@@ -3,7 +3,7 @@
 /// The first slot that holds `number`. All four are compared: the position cannot be predicted, and a
 /// mispredicted branch costs more than four comparisons.
 #[inline(always)]
-pub fn slot_of(slots: &[u32; 4], number: u32) -> Option<usize> {
+pub(crate) fn slot_of(slots: &[u32; 4], number: u32) -> Option<usize> {
     let held = (0..4).fold(0, |held, k| held | u32::from(slots[k] == number) << k);
     (held != 0).then_some(held.trailing_zeros() as usize)
 }

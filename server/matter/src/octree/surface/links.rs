@@ -9,7 +9,7 @@ use super::super::lattice::DIRECTIONS;
 
 /// Corners of the face of a cell in each direction, counter-clockwise seen from outside. Bit k is the end along
 /// axis k.
-pub const CORNERS: [[usize; 4]; 6] =
+pub(super) const CORNERS: [[usize; 4]; 6] =
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
 /// Direction from the middle of each face to its edges.
@@ -20,7 +20,7 @@ const SIDES: [[usize; 4]; 6] =
 ///
 /// Of the four cells around the edge, those that links connect with the cell of `face` are walked through up to
 /// the next cut link. Seen from the other face, the walk leads back.
-pub fn partner(octree: &Octree, face: u32, k: usize) -> (u32, u32) {
+pub(super) fn partner(octree: &Octree, face: u32, k: usize) -> (u32, u32) {
     let (leaf, d) = (face / 6, face as usize % 6);
     let side = SIDES[d][k];
     let (d_back, side_back) = (d ^ 1, side ^ 1);

@@ -10,7 +10,7 @@ use crate::element::MaterialPoint;
 
 /// What a vertex stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-pub enum Source {
+pub(super) enum Source {
     /// Point of a surface that was laid on dual contouring.
     Own(u32),
     /// Vertex of dual contouring.
@@ -23,7 +23,7 @@ pub enum Source {
 
 /// A surface, with the triangles of every group and around every vertex.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Mosaic {
+pub(super) struct Mosaic {
     surface: Surface,
     /// What each vertex stands for.
     sources: Vec<Source>,
@@ -46,17 +46,17 @@ pub struct Mosaic {
 
 impl Mosaic {
     /// The surface.
-    pub fn surface(&self) -> &Surface {
+    pub(super) fn surface(&self) -> &Surface {
         &self.surface
     }
 
     /// Sets how many groups there are.
-    pub fn set_groups(&mut self, n: usize) {
+    pub(super) fn set_groups(&mut self, n: usize) {
         self.of.resize(n, NONE);
     }
 
     /// The vertex that stands for `source`, a new one if there was none, at `point`.
-    pub fn vertex(&mut self, source: Source, point: MaterialPoint) -> u32 {
+    pub(super) fn vertex(&mut self, source: Source, point: MaterialPoint) -> u32 {
         let new = self.sources.len() as u32;
         let number = self.number_of(source);
         let v = if *number == NONE { new } else { *number };
@@ -72,7 +72,7 @@ impl Mosaic {
     }
 
     /// Moves the vertex that stands for `source` to another place in the material, if there is one.
-    pub fn rebind(&mut self, source: Source, point: &MaterialPoint) {
+    pub(super) fn rebind(&mut self, source: Source, point: &MaterialPoint) {
         let v = *self.number_of(source);
         if v != NONE {
             self.surface.vertices[v as usize] = *point;
@@ -94,12 +94,12 @@ impl Mosaic {
     }
 
     /// Moves every vertex to another place in the material.
-    pub fn rebind_all(&mut self, place: impl Fn(&MaterialPoint) -> MaterialPoint) {
+    pub(super) fn rebind_all(&mut self, place: impl Fn(&MaterialPoint) -> MaterialPoint) {
         self.surface.vertices.iter_mut().for_each(|point| *point = place(point));
     }
 
     /// Adds a triangle to a group.
-    pub fn add(&mut self, group: u32, corners: [u32; 3], tag: u32) {
+    pub(super) fn add(&mut self, group: u32, corners: [u32; 3], tag: u32) {
         let t = self.surface.triangles.len() as u32;
         self.surface.triangles.push(corners);
         self.surface.tags.push(tag);
@@ -111,7 +111,7 @@ impl Mosaic {
     }
 
     /// Removes all triangles of a group.
-    pub fn clear(&mut self, group: u32) {
+    pub(super) fn clear(&mut self, group: u32) {
         while self.of[group as usize] != NONE {
             self.remove(self.of[group as usize]);
         }
@@ -143,7 +143,7 @@ impl Mosaic {
     }
 
     /// Removes all vertices without triangles.
-    pub fn drop_loose(&mut self) {
+    pub(super) fn drop_loose(&mut self) {
         let mut loose = std::mem::take(&mut self.loose);
         loose.retain(|&v| self.at[v as usize] == NONE);
         // Highest number first: the vertex that takes over a free number is then never loose itself.

@@ -10,7 +10,7 @@ use super::place::Placed;
 use crate::element::MaterialPoint;
 
 /// Where the vertices are.
-pub struct Vertices<'a> {
+pub(super) struct Vertices<'a> {
     /// Position of each at rest [m].
     pub rest: &'a mut Vec<Vector3<f64>>,
     /// The same place in the material.
@@ -19,7 +19,7 @@ pub struct Vertices<'a> {
 
 /// Quads by number. Half-edge 4·quad + k runs from corner k to the next.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Patches {
+pub(super) struct Patches {
     /// Opposite of each half-edge, or [`NONE`] while it is open.
     twin: Vec<u32>,
     /// Vertex of each corner.
@@ -44,7 +44,7 @@ pub struct Patches {
 
 impl Patches {
     /// Begins a change.
-    pub fn begin(&mut self) {
+    pub(super) fn begin(&mut self) {
         self.round += 1;
         self.dirty.clear();
         self.walked.clear();
@@ -52,7 +52,7 @@ impl Patches {
     }
 
     /// Adds a quad with four open edges.
-    pub fn add_quad(&mut self) {
+    pub(super) fn add_quad(&mut self) {
         self.twin.extend([NONE; 4]);
         self.corner.extend([NONE; 4]);
         self.seen.extend([0; 4]);
@@ -60,46 +60,46 @@ impl Patches {
     }
 
     /// Reports that a quad changed: its vertices are determined anew.
-    pub fn touch(&mut self, q: u32) {
+    pub(super) fn touch(&mut self, q: u32) {
         if std::mem::replace(&mut self.changed[q as usize], self.round) != self.round {
             self.dirty.push(q);
         }
     }
 
     /// Quads that changed in this round.
-    pub fn touched(&self) -> &[u32] {
+    pub(super) fn touched(&self) -> &[u32] {
         &self.dirty
     }
 
     /// One corner of every patch that was walked in this round.
-    pub fn walked(&self) -> &[u32] {
+    pub(super) fn walked(&self) -> &[u32] {
         &self.walked
     }
 
     /// Number of quads.
-    pub fn n_quads(&self) -> usize {
+    pub(super) fn n_quads(&self) -> usize {
         self.changed.len()
     }
 
     /// Number of vertices.
-    pub fn n_vertices(&self) -> usize {
+    pub(super) fn n_vertices(&self) -> usize {
         self.representative.len()
     }
 
     /// Opposite of a half-edge, or [`NONE`] while it is open.
     #[inline]
-    pub fn twin(&self, h: u32) -> u32 {
+    pub(super) fn twin(&self, h: u32) -> u32 {
         self.twin[h as usize]
     }
 
     /// Vertex of a corner.
     #[inline]
-    pub fn vertex(&self, corner: u32) -> u32 {
+    pub(super) fn vertex(&self, corner: u32) -> u32 {
         self.corner[corner as usize]
     }
 
     /// Separates a half-edge from its opposite.
-    pub fn open(&mut self, h: u32) {
+    pub(super) fn open(&mut self, h: u32) {
         let twin = std::mem::replace(&mut self.twin[h as usize], NONE);
         if twin != NONE {
             self.twin[twin as usize] = NONE;
@@ -107,12 +107,12 @@ impl Patches {
     }
 
     /// Makes two open half-edges opposites of each other.
-    pub fn join(&mut self, g: u32, h: u32) {
+    pub(super) fn join(&mut self, g: u32, h: u32) {
         (self.twin[g as usize], self.twin[h as usize]) = (h, g);
     }
 
     /// Numbers the vertices of all changed quads. `place` is called with the corners of each of their patches.
-    pub fn number(&mut self, vertices: &mut Vertices<'_>, mut place: impl FnMut(&[u32]) -> Placed) {
+    pub(super) fn number(&mut self, vertices: &mut Vertices<'_>, mut place: impl FnMut(&[u32]) -> Placed) {
         let mut patch = std::mem::take(&mut self.patch);
         for i in 0..self.dirty.len() {
             for first in 4 * self.dirty[i]..4 * self.dirty[i] + 4 {
@@ -142,7 +142,7 @@ impl Patches {
     }
 
     /// Calls `visit` for all corners around the vertex of corner `first`.
-    pub fn for_patch(&self, first: u32, mut visit: impl FnMut(u32)) {
+    pub(super) fn for_patch(&self, first: u32, mut visit: impl FnMut(u32)) {
         let mut c = first;
         loop {
             visit(c);

@@ -19,7 +19,7 @@ const SWEEPS: usize = 20;
 
 /// Where a link is cut on one of its sides.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Crossing {
+pub(super) struct Crossing {
     /// Distance from the centre of the cell, in sides of finest cells.
     pub distance: f64,
     /// Unit normal.
@@ -28,7 +28,7 @@ pub struct Crossing {
 
 /// A vertex of the surface at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
+pub(super) struct Placed {
     /// Position at rest [m].
     pub at: Vector3<f64>,
     /// The same place in the material.
@@ -38,7 +38,7 @@ pub struct Placed {
 impl Crossing {
     /// The cut of `face` (6·leaf + direction), and its incision. Halfway and across the link if nothing is known
     /// of it.
-    pub fn of(octree: &Octree, face: u32) -> (Self, u32) {
+    pub(super) fn of(octree: &Octree, face: u32) -> (Self, u32) {
         let (cell, d) = (&octree.cells()[face as usize / 6], face as usize % 6);
         let (axis, up) = (d / 2, d % 2 == 1);
         let mut lower = cell.at;
@@ -55,7 +55,7 @@ impl Crossing {
 }
 
 /// The vertex of a patch in the dual cell around lattice point `p`. `faces` (6·leaf + direction) ascend.
-pub fn place(octree: &Octree, p: At, faces: &[u32], crossing: impl Fn(u32) -> Crossing) -> Placed {
+pub(super) fn place(octree: &Octree, p: At, faces: &[u32], crossing: impl Fn(u32) -> Crossing) -> Placed {
     let centre = |leaf: u32| {
         let at = octree.cells()[leaf as usize].at;
         Vector3::from([0, 1, 2].map(|k| f64::from(at[k] - p[k]) + 0.5))
@@ -78,7 +78,7 @@ pub fn place(octree: &Octree, p: At, faces: &[u32], crossing: impl Fn(u32) -> Cr
 }
 
 /// Binds the point `at` [m] to a leaf.
-pub fn bind(octree: &Octree, leaf: u32, at: Vector3<f64>) -> Placed {
+pub(super) fn bind(octree: &Octree, leaf: u32, at: Vector3<f64>) -> Placed {
     let cell = &octree.cells()[leaf as usize];
     let local = octree.lattice().coordinates(&at);
     let xi = [0, 1, 2].map(|k| (local[k] - f64::from(cell.at[k])) / f64::from(cell.side()));

@@ -60,7 +60,7 @@ pub(super) struct Disc {
 
 impl Disc {
     /// The links that it crosses and that nothing has cut.
-    pub fn links(&self, octree: &Octree, incision: u32) -> Vec<(LinkKey, CutLink)> {
+    pub(super) fn links(&self, octree: &Octree, incision: u32) -> Vec<(LinkKey, CutLink)> {
         let lattice = octree.lattice();
         let mut found = Vec::new();
         let [nx, ny, nz] = lattice.size.map(|n| n as i32);

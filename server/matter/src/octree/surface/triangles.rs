@@ -19,7 +19,7 @@ const NEARER: f64 = 0.01;
 /// Edges to divide, by name: 5·face + k for edge k of a quad, k = 4 for its diagonal. Of the two names of an edge
 /// the smaller counts.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Doubled {
+pub(super) struct Doubled {
     edges: BTreeSet<u32>,
     around: Vec<(u32, u32)>,
     vertices: Vec<(u32, u32)>,
@@ -27,12 +27,12 @@ pub struct Doubled {
 
 impl Doubled {
     /// Forgets an edge.
-    pub fn forget(&mut self, name: u32) {
+    pub(super) fn forget(&mut self, name: u32) {
         self.edges.remove(&name);
     }
 
     /// Takes new numbers of the faces, in the same order.
-    pub fn renumber(&mut self, face: impl Fn(u32) -> u32) {
+    pub(super) fn renumber(&mut self, face: impl Fn(u32) -> u32) {
         self.edges = self.edges.iter().map(|name| 5 * face(name / 5) + name % 5).collect();
     }
 }

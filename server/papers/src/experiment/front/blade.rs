@@ -22,7 +22,7 @@ use crate::lab::Trouble;
 type V = Vector3<f64>;
 
 /// Steps of the blade to the front, and those of the simulation that one of them may take.
-pub const ADVANCES: usize = 15;
+pub(super) const ADVANCES: usize = 15;
 const MOST_STEPS: usize = 50;
 /// Where the edge is located: through the beam [m], and above and below the plane of the cut [m]. Between the lips it
 /// lies in the middle.
@@ -36,7 +36,7 @@ const BEYOND: f64 = 5.0;
 
 /// The plane of the cut and the depth to which it goes [m].
 #[derive(Clone, Copy, Debug)]
-pub struct Depth {
+pub(super) struct Depth {
     pub plane_m: f64,
     pub front_m: f64,
 }
@@ -96,7 +96,7 @@ fn place(simulation: &Simulation, probe: &mut Probe) -> V {
 ///
 /// # Errors
 /// The user ended the study, or the beam is another one.
-pub fn advance(
+pub(super) fn advance(
     scene: &Scene,
     depth: Depth,
     at: &[Point],

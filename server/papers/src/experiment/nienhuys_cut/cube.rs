@@ -12,30 +12,30 @@ use crate::lab::Trouble;
 type V = Vector3<f64>;
 
 /// Edge [m].
-pub const EDGE_M: f64 = 0.1;
+pub(super) const EDGE_M: f64 = 0.1;
 /// Cells along an edge: 9³ = 729 nodes, 6 · 8³ = 3,072 elements.
-pub const CELLS: usize = 8;
+pub(super) const CELLS: usize = 8;
 /// Dilating force on each side [N].
 const PULL_N: f64 = 10.0;
 
 /// A plane: a point [m] and the unit normal.
-pub type Plane = [V; 2];
+pub(super) type Plane = [V; 2];
 
 /// The mesh, of cells that are divided as in the thesis.
-pub fn mesh() -> TetMesh {
+pub(super) fn mesh() -> TetMesh {
     box_mesh(V::zeros(), V::repeat(EDGE_M), [CELLS; 3], BoxPattern::Octahedral6)
 }
 
 /// A plane whose normal is turned by an angle in the x–z plane, from x, and then raised from there towards y [°]. It
 /// passes the centre at this distance over the edge.
-pub fn plane(turned: f64, raised: f64, off: f64) -> Plane {
+pub(super) fn plane(turned: f64, raised: f64, off: f64) -> Plane {
     let (a, b) = (turned.to_radians(), raised.to_radians());
     let normal = V::new(a.cos() * b.cos(), b.sin(), a.sin() * b.cos());
     [V::repeat(0.5 * EDGE_M) + normal * (off * EDGE_M), normal]
 }
 
 /// A blade that sweeps all of a plane within the cube.
-pub fn blade([point, normal]: &Plane) -> BladeSweep {
+pub(super) fn blade([point, normal]: &Plane) -> BladeSweep {
     let helper = if normal.x.abs() < 0.6 { V::x() } else { V::y() };
     let u = normal.cross(&helper).normalize() * (2.0 * EDGE_M);
     let w = normal.cross(&u);
@@ -47,7 +47,7 @@ pub fn blade([point, normal]: &Plane) -> BladeSweep {
 ///
 /// # Errors
 /// A solve that does not converge.
-pub fn dilated(snap: SnapSettings) -> Result<Body, Trouble> {
+pub(super) fn dilated(snap: SnapSettings) -> Result<Body, Trouble> {
     let mut body = body(mesh(), snap, |X| X.y < 1e-9)?;
     for (z, force) in [(0.0, -PULL_N), (EDGE_M, PULL_N)] {
         let side = nodes(&body, |X| (X.z - z).abs() < 1e-9);

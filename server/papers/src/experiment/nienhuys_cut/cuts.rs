@@ -24,14 +24,14 @@ const TO: f64 = 1e-3;
 
 /// A way to cut along faces.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Way {
+pub(super) struct Way {
     /// In words.
     pub name: &'static str,
     pub snap: SnapSettings,
 }
 
 /// The ways, the jagged one first.
-pub const WAYS: [Way; 4] = [
+pub(super) const WAYS: [Way; 4] = [
     Way { name: "no node moves", snap: SnapSettings { moves: Moves::None, clean: true } },
     Way { name: "sound moves only", snap: SnapSettings { moves: Moves::Sound, clean: true } },
     Way { name: "pressed, not cleaned", snap: SnapSettings { moves: Moves::Press, clean: false } },
@@ -39,7 +39,7 @@ pub const WAYS: [Way; 4] = [
 ];
 
 /// What cuts did to a body.
-pub struct Made {
+pub(super) struct Made {
     /// The body after the cuts.
     pub body: Body,
     /// Sums over all cuts.
@@ -51,7 +51,7 @@ pub struct Made {
 impl Made {
     /// Largest distance [m] of a node of the lips from the nearest of the `planes`, each a point and a unit normal. Held
     /// nodes do not count: no cut moves them.
-    pub fn off_m(&self, planes: &[[V; 2]]) -> f64 {
+    pub(super) fn off_m(&self, planes: &[[V; 2]]) -> f64 {
         let surface = self.body.surface();
         let lips = surface.triangles.iter().zip(&surface.tags).filter(|(_, tag)| **tag > 0);
         let rest = self.body.rest_positions();
@@ -65,7 +65,7 @@ impl Made {
     }
 
     /// Number of degenerate elements of the whole mesh.
-    pub fn flat(&self) -> usize {
+    pub(super) fn flat(&self) -> usize {
         let Some(tets) = self.body.tets() else { return 0 };
         let mesh = tets.mesh();
         let x = |tet: &[u32; 4]| tet.map(|n| mesh.nodes[n as usize]);
@@ -77,7 +77,7 @@ impl Made {
 ///
 /// # Errors
 /// A mesh that is none.
-pub fn body(mesh: TetMesh, snap: SnapSettings, is_held: impl Fn(&V) -> bool) -> Result<Body, Trouble> {
+pub(super) fn body(mesh: TetMesh, snap: SnapSettings, is_held: impl Fn(&V) -> bool) -> Result<Body, Trouble> {
     let rayleigh = Rayleigh { mass_1_s: 0.0, stiffness_s: 0.0 };
     let material =
         Material { young_pa: YOUNG_PA, poisson: POISSON, density_kg_m3: 1e3, law: Law::Linear, rayleigh };
@@ -95,7 +95,7 @@ pub fn body(mesh: TetMesh, snap: SnapSettings, is_held: impl Fn(&V) -> bool) -> 
 }
 
 /// Numbers of the nodes whose rest positions are wanted.
-pub fn nodes(body: &Body, is_wanted: impl Fn(&V) -> bool) -> Vec<u32> {
+pub(super) fn nodes(body: &Body, is_wanted: impl Fn(&V) -> bool) -> Vec<u32> {
     (0..).zip(body.rest_positions()).filter(|(_, X)| is_wanted(X)).map(|(n, _)| n).collect()
 }
 
@@ -103,7 +103,7 @@ pub fn nodes(body: &Body, is_wanted: impl Fn(&V) -> bool) -> Vec<u32> {
 ///
 /// # Errors
 /// A solve that does not converge.
-pub fn settle(body: &mut Body) -> Result<(), Trouble> {
+pub(super) fn settle(body: &mut Body) -> Result<(), Trouble> {
     let linear = PcgSettings { iterations: 20_000, tolerance: 1e-9 };
     let settings = StaticSettings { tolerance: 1e-6, newton_steps: 20, linear };
     match body.solve_static(V::zeros(), &settings)?.converged {
@@ -116,7 +116,7 @@ pub fn settle(body: &mut Body) -> Result<(), Trouble> {
 ///
 /// # Errors
 /// A sweep that is none.
-pub fn make(mut body: Body, blades: &[BladeSweep]) -> Result<Made, Trouble> {
+pub(super) fn make(mut body: Body, blades: &[BladeSweep]) -> Result<Made, Trouble> {
     let mut report = SnapReport::default();
     let mut cut_s = 0.0;
     for (incision, blade) in (1..).zip(blades) {
@@ -140,7 +140,7 @@ pub fn make(mut body: Body, blades: &[BladeSweep]) -> Result<Made, Trouble> {
 ///
 /// # Errors
 /// More iterations than any mesh here needs.
-pub fn relax(body: &mut Body) -> Result<[u32; 2], Trouble> {
+pub(super) fn relax(body: &mut Body) -> Result<[u32; 2], Trouble> {
     let model = body.discrete_model()?;
     let mut K = model.pattern();
     model.tangent(model.rest(), Tangent::Exact, &mut K);

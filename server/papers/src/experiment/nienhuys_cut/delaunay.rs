@@ -23,7 +23,7 @@ const RINGS: [usize; 4] = [1, 5, 10, 17];
 /// Layers of points; 33 × 27 are the 891 nodes of the thesis.
 const LAYERS: usize = 27;
 /// Distance of layers and of rings [m].
-pub const SPACING_M: f64 = 0.01;
+pub(super) const SPACING_M: f64 = 0.01;
 /// Part of the distance by which points are moved at random.
 const JITTER: f64 = 0.2;
 /// Rise of the domed ends over the distance; flat ends would not be in general position.
@@ -38,7 +38,7 @@ const FAR: f64 = 100.0;
 ///
 /// # Errors
 /// Points that are not in general position, which the fixed sequence of random numbers excludes.
-pub fn cylinder(seed: u64) -> Result<(TetMesh, [f64; 2]), Trouble> {
+pub(super) fn cylinder(seed: u64) -> Result<(TetMesh, [f64; 2]), Trouble> {
     let mut random = Random(seed);
     let (height, radius) = ((LAYERS - 1) as f64 * SPACING_M, (RINGS.len() - 1) as f64 * SPACING_M);
     let mut points = Vec::new();
@@ -72,7 +72,7 @@ pub fn cylinder(seed: u64) -> Result<(TetMesh, [f64; 2]), Trouble> {
 ///
 /// # Errors
 /// Points that are not in general position.
-pub fn delaunay(points: Vec<V>, random: &mut Random) -> Result<TetMesh, Trouble> {
+pub(super) fn delaunay(points: Vec<V>, random: &mut Random) -> Result<TetMesh, Trouble> {
     let n = points.len();
     let size = points.iter().map(V::norm).fold(0.0, f64::max);
     let mut nodes = points;
@@ -161,7 +161,7 @@ fn peel(mesh: &mut TetMesh) {
 }
 
 /// Least height over longest edge of a tetrahedron.
-pub fn flatness(x: &[V; 4]) -> f64 {
+pub(super) fn flatness(x: &[V; 4]) -> f64 {
     let six_volumes = (x[1] - x[0]).dot(&(x[2] - x[0]).cross(&(x[3] - x[0])));
     let area = |[a, b, c]: [usize; 3]| (x[b] - x[a]).cross(&(x[c] - x[a])).norm();
     let largest = TET_FACES.into_iter().map(area).fold(0.0, f64::max);

@@ -34,7 +34,7 @@ const SEEDS: [u64; 3] = [1, 2, 3];
 ///
 /// # Errors
 /// A body that does not come to rest, or the user ended the study.
-pub fn cuts(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+pub(super) fn cuts(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let mut result = ExperimentResult {
         name: "nienhuys-cut",
         title: "Cuts along faces: figures 3.5 and 3.13 to 3.16 of Nienhuys".into(),

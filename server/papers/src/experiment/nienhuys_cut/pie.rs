@@ -16,10 +16,10 @@ use crate::lab::Trouble;
 type V = Vector3<f64>;
 
 /// Cuts, each through the whole cylinder along its axis.
-pub const CUTS: usize = 3;
+pub(super) const CUTS: usize = 3;
 
 /// The cylinder, its height and radius [m].
-pub struct Cylinder {
+pub(super) struct Cylinder {
     pub mesh: TetMesh,
     height_m: f64,
     radius_m: f64,
@@ -30,7 +30,7 @@ impl Cylinder {
     ///
     /// # Errors
     /// Points that are not in general position.
-    pub fn new(seed: u64) -> Result<Self, Trouble> {
+    pub(super) fn new(seed: u64) -> Result<Self, Trouble> {
         let (mesh, [height_m, radius_m]) = delaunay::cylinder(seed)?;
         Ok(Self { mesh, height_m, radius_m })
     }
@@ -39,13 +39,13 @@ impl Cylinder {
     ///
     /// # Errors
     /// A mesh that is none.
-    pub fn body(&self, snap: SnapSettings) -> Result<Body, Trouble> {
+    pub(super) fn body(&self, snap: SnapSettings) -> Result<Body, Trouble> {
         let low = -0.5 * self.height_m;
         body(self.mesh.clone(), snap, |X| X.z < low + 1e-9)
     }
 
     /// The planes through the axis, the first of which is turned by an angle from x [rad].
-    pub fn planes(&self, from: f64) -> [Plane; CUTS] {
+    pub(super) fn planes(&self, from: f64) -> [Plane; CUTS] {
         std::array::from_fn(|k| {
             let angle = from + PI * k as f64 / CUTS as f64;
             [V::zeros(), V::new(-angle.sin(), angle.cos(), 0.0)]
@@ -53,7 +53,7 @@ impl Cylinder {
     }
 
     /// The blades that sweep these planes.
-    pub fn blades(&self, from: f64) -> [BladeSweep; CUTS] {
+    pub(super) fn blades(&self, from: f64) -> [BladeSweep; CUTS] {
         let (reach, up) = (1.5 * self.radius_m, V::new(0.0, 0.0, self.height_m));
         self.planes(from).map(|[_, normal]| {
             let out = normal.cross(&V::z()) * reach;
@@ -66,7 +66,7 @@ impl Cylinder {
 ///
 /// # Errors
 /// None for a sound body.
-pub fn spread(body: &mut Body, by_m: f64) -> Result<(), Trouble> {
+pub(super) fn spread(body: &mut Body, by_m: f64) -> Result<(), Trouble> {
     let parts = body.parts().of_copy.clone();
     let count = parts.iter().max().map_or(0, |most| *most as usize + 1);
     let mut sums = vec![(V::zeros(), 0.0); count];

@@ -14,14 +14,14 @@ use super::delaunay::flatness;
 type V = Vector3<f64>;
 
 /// An element is degenerate below this aspect ratio (§3.3).
-pub const FLAT: f64 = 0.01;
+pub(super) const FLAT: f64 = 0.01;
 /// How far outside an element or a face a place may lie, in barycentric coordinates: rounding.
 const ROUNDING: f64 = 1e-9;
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// Counts of a cut by the printed rules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
+pub(super) struct Counts {
     /// Selected faces.
     pub faces: usize,
     /// Elements whose four nodes are marked, from which a face is taken at random; here the first.
@@ -35,7 +35,7 @@ pub struct Counts {
 }
 
 /// Cuts `mesh` by the plane through `point` with the unit `normal`.
-pub fn cut(mesh: &TetMesh, point: V, normal: V) -> Counts {
+pub(super) fn cut(mesh: &TetMesh, point: V, normal: V) -> Counts {
     let side = |n: u32| (mesh.nodes[n as usize] - point).dot(&normal);
     let mut counts = Counts::default();
     let mut faces: BTreeSet<[u32; 3]> = BTreeSet::new();

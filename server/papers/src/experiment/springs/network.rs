@@ -30,7 +30,7 @@ struct Spring {
 }
 
 /// Masses and springs on the nodes and edges of a mesh.
-pub struct Network {
+pub(super) struct Network {
     springs: Vec<Spring>,
     /// Masses [kg]; infinite where the node is held.
     mass: Vec<f64>,
@@ -55,7 +55,7 @@ struct Cg {
 impl Network {
     /// The network of a mesh of a material with Young's modulus `young_pa` and this density; nodes for which `held` is
     /// true do not move. A spring has the stiffness E Σ V / L², over the tetrahedra around it.
-    pub fn new(
+    pub(super) fn new(
         mesh: &TetMesh,
         (young_pa, density_kg_m3): (f64, f64),
         beta_s: f64,
@@ -88,18 +88,18 @@ impl Network {
     }
 
     /// Multiplies the stiffness of all springs.
-    pub fn scale(&mut self, factor: f64) {
+    pub(super) fn scale(&mut self, factor: f64) {
         self.springs.iter_mut().for_each(|spring| spring.k *= factor);
     }
 
     /// Places of the masses [m].
-    pub fn positions(&self) -> &[V] {
+    pub(super) fn positions(&self) -> &[V] {
         &self.x
     }
 
     /// A step of `h` seconds under `gravity` [m/s²], with at most this many iterations of conjugate gradients, until the
     /// residual has fallen by `tolerance`. Returns how far a mass moved at most [m].
-    pub fn step(&mut self, h: f64, gravity: V, (iterations, tolerance): (u32, f64)) -> f64 {
+    pub(super) fn step(&mut self, h: f64, gravity: V, (iterations, tolerance): (u32, f64)) -> f64 {
         self.linearise();
         let Self { springs, mass, x, v, beta_s, solver } = self;
         // (M + (h² + h β) K) Δv = h (f + M g) − (h² + h β) K v

@@ -6,7 +6,7 @@ use super::touch::{Run, WORLD, block};
 use crate::lab::Trouble;
 
 /// A blade that is pressed, torn and shaken.
-pub const PRESSED: Case = Case {
+pub(super) const PRESSED: Case = Case {
     number: None,
     name: "cutting-with-force",
     title: "A blade is pressed into a tough block, torn through it, and shaken in it",

@@ -13,7 +13,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::watch::{Common, Watch, charts};
 
 /// Case 5.
-pub const HALVED: Case = Case {
+pub(super) const HALVED: Case = Case {
     number: Some(5),
     name: "halved-edges",
     title: "Every edge cut in its exact middle",
@@ -28,7 +28,7 @@ pub const HALVED: Case = Case {
 };
 
 /// Case 6.
-pub const RANDOM: Case = Case {
+pub(super) const RANDOM: Case = Case {
     number: Some(6),
     name: "random-cuts",
     title: "Twenty random cuts through one ring of elements",
@@ -42,7 +42,7 @@ pub const RANDOM: Case = Case {
 };
 
 /// Case 9.
-pub const BRANCHES: Case = Case {
+pub(super) const BRANCHES: Case = Case {
     number: Some(9),
     name: "branches",
     title: "T, X and Y junctions, and a cut inside a piece",
@@ -55,7 +55,7 @@ pub const BRANCHES: Case = Case {
 };
 
 /// Case 12.
-pub const MOVING: Case = Case {
+pub(super) const MOVING: Case = Case {
     number: Some(12),
     name: "moving-tissue",
     title: "The tissue moves at 1 m/s while it is cut",
@@ -68,7 +68,7 @@ pub const MOVING: Case = Case {
 };
 
 /// Case 13.
-pub const CLAMPED: Case = Case {
+pub(super) const CLAMPED: Case = Case {
     number: Some(13),
     name: "cut-at-clamp",
     title: "A cut beside the clamped face",

@@ -19,7 +19,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::watch::{Common, Watch, charts};
 
 /// Cases 2 to 5 on cells.
-pub const ALIGNED: Case = Case {
+pub(super) const ALIGNED: Case = Case {
     number: None,
     name: "cells-on-lattice",
     title: "Octree cells: blades exactly on corners, edges, faces and centres",
@@ -35,7 +35,7 @@ pub const ALIGNED: Case = Case {
 };
 
 /// Cases 6 and 9 on cells.
-pub const BRANCHES: Case = Case {
+pub(super) const BRANCHES: Case = Case {
     number: None,
     name: "cells-branches",
     title: "Octree cells: random and branching cuts",
@@ -50,7 +50,7 @@ pub const BRANCHES: Case = Case {
 };
 
 /// Cases 7, 8 and 13 on cells.
-pub const FALLING: Case = Case {
+pub(super) const FALLING: Case = Case {
     number: None,
     name: "cells-free-fall",
     title: "Octree cells: every fragment falls with g",
@@ -63,7 +63,7 @@ pub const FALLING: Case = Case {
 };
 
 /// Cases 10 to 12 on cells.
-pub const GROWTH: Case = Case {
+pub(super) const GROWTH: Case = Case {
     number: None,
     name: "cells-growing-cut",
     title: "Octree cells: a cut through moving tissue grows tick by tick",
@@ -77,7 +77,7 @@ pub const GROWTH: Case = Case {
 };
 
 /// Cells that are divided and joined while the body moves and is cut.
-pub const ADAPTING: Case = Case {
+pub(super) const ADAPTING: Case = Case {
     number: None,
     name: "cells-adapting",
     title: "Octree cells: divided near a probe and joined behind it, in tissue that moves and is cut",
@@ -92,20 +92,25 @@ pub const ADAPTING: Case = Case {
 };
 
 /// A cube of 0.1 m as octree cells.
-pub fn cells(across: u32, levels: u8) -> Result<Octree, OctreeError> {
+pub(super) fn cells(across: u32, levels: u8) -> Result<Octree, OctreeError> {
     let shape = BoxShape { min: V::zeros(), max: V::repeat(L) };
     Octree::fill(&shape, OctreeSettings { cells: across, levels }, &|_| 0)
 }
 
 /// A body of these cells with this bound of iterations and tolerance.
-pub fn body(octree: Octree, setting: &Setting, iterations: u32, tolerance: f64) -> Result<Body, Trouble> {
+pub(super) fn body(
+    octree: Octree,
+    setting: &Setting,
+    iterations: u32,
+    tolerance: f64,
+) -> Result<Body, Trouble> {
     let solver = PcgSettings { iterations, tolerance };
     let settings = BodySettings { solver, ablation: setting.ablation, ..BodySettings::default() };
     Ok(Body::of_space(Box::new(OctreeSpace::new(octree)), SOFT, settings)?)
 }
 
 /// Deviation of the volumes of all parts from that of the cube, relative.
-pub fn volume_error(body: &Body) -> f64 {
+pub(super) fn volume_error(body: &Body) -> f64 {
     (body.components().volume.iter().sum::<f64>() / L.powi(3) - 1.0).abs()
 }
 
@@ -154,7 +159,7 @@ fn aligned(setting: &Setting) -> Result<Evidence, Trouble> {
 }
 
 /// Parts by shared vertices.
-pub fn parts_by_vertices(octree: &Octree) -> usize {
+pub(super) fn parts_by_vertices(octree: &Octree) -> usize {
     let mut root: Vec<usize> = (0..octree.cells().len()).collect();
     fn find(root: &[usize], mut i: usize) -> usize {
         while root[i] != i {

@@ -20,7 +20,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::watch::{Common, Watch, charts};
 
 /// Case 1 on cells.
-pub const SLIVER: Case = Case {
+pub(super) const SLIVER: Case = Case {
     number: None,
     name: "cells-sliver",
     title: "Octree cells: blades that pass 1e-3 to 1e-15 of a cell beside centres",
@@ -35,7 +35,7 @@ pub const SLIVER: Case = Case {
 };
 
 /// Case 5 on cells.
-pub const HALVED: Case = Case {
+pub(super) const HALVED: Case = Case {
     number: None,
     name: "cells-halved-links",
     title: "Octree cells: every link cut in its exact middle",
@@ -50,7 +50,7 @@ pub const HALVED: Case = Case {
 };
 
 /// Case 7 on cells.
-pub const FREED: Case = Case {
+pub(super) const FREED: Case = Case {
     number: None,
     name: "cells-freed-cell",
     title: "Octree cells: a single cell is cut free",
@@ -65,7 +65,7 @@ pub const FREED: Case = Case {
 };
 
 /// Case 10 on cells.
-pub const ADVANCE: Case = Case {
+pub(super) const ADVANCE: Case = Case {
     number: None,
     name: "cells-tenth-of-a-cell",
     title: "Octree cells: a cut that grows by a tenth of a cell per tick",

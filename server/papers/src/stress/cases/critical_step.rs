@@ -10,7 +10,7 @@ use crate::stress::case::{Case, Setting};
 use crate::stress::evidence::Evidence;
 
 /// Shown beside the numbered cases.
-pub const CASE: Case = Case {
+pub(super) const CASE: Case = Case {
     number: None,
     name: "critical-step",
     title: "Critical time step of a cut element",

@@ -10,7 +10,7 @@ use super::touch::WORLD;
 use crate::lab::Trouble;
 
 /// Fifty bodies in a heap.
-pub const CASE: Case = Case {
+pub(super) const CASE: Case = Case {
     number: None,
     name: "fifty-bodies",
     title: "Fifty bodies fall on each other",

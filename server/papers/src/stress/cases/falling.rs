@@ -12,7 +12,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::watch::{Common, Watch, charts};
 
 /// Case 7.
-pub const FREED_NODE: Case = Case {
+pub(super) const FREED_NODE: Case = Case {
     number: Some(7),
     name: "freed-node",
     title: "A single node is cut free",
@@ -27,7 +27,7 @@ pub const FREED_NODE: Case = Case {
 };
 
 /// Case 8.
-pub const FRAGMENTS: Case = Case {
+pub(super) const FRAGMENTS: Case = Case {
     number: Some(8),
     name: "free-fall",
     title: "Every fragment falls with g",

@@ -11,7 +11,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::watch::{Common, Watch, charts};
 
 /// Case 32.
-pub const CASE: Case = Case {
+pub(super) const CASE: Case = Case {
     number: Some(32),
     name: "far-field",
     title: "A kilometre from the origin",

@@ -7,7 +7,7 @@ use super::support::pieces;
 use crate::stress::evidence::Evidence;
 
 /// Records the flaws of a cut state as figures.
-pub fn tell(flaws: &Flaws, evidence: &mut Evidence) {
+pub(super) fn tell(flaws: &Flaws, evidence: &mut Evidence) {
     evidence.exactly(
         "edges and vertices at which the surface is not closed and 2-manifold",
         flaws.surface,
@@ -19,7 +19,7 @@ pub fn tell(flaws: &Flaws, evidence: &mut Evidence) {
 }
 
 /// Largest |Σ mass of a part's copies / (density · its volume) − 1|.
-pub fn mass_of_parts(body: &Body) -> f64 {
+pub(super) fn mass_of_parts(body: &Body) -> f64 {
     let density = body.material().density_kg_m3;
     let mut volume = vec![0.0; body.parts().len()];
     for (piece, element) in pieces(body) {

@@ -13,7 +13,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::watch::{Common, Watch, charts};
 
 /// Case 10.
-pub const GROWTH: Case = Case {
+pub(super) const GROWTH: Case = Case {
     number: Some(10),
     name: "growing-cut",
     title: "A cut that grows by a tenth of an element per tick",
@@ -28,7 +28,7 @@ pub const GROWTH: Case = Case {
 };
 
 /// Case 11.
-pub const AGAIN: Case = Case {
+pub(super) const AGAIN: Case = Case {
     number: Some(11),
     name: "same-cut-again",
     title: "The same cut fifty times",
@@ -44,7 +44,7 @@ pub const AGAIN: Case = Case {
 const CELL: f64 = 0.01;
 
 /// Rest area of the lips [m²] and their reach along x [m].
-pub fn wound(body: &Body) -> (f64, f64) {
+pub(super) fn wound(body: &Body) -> (f64, f64) {
     let surface = body.surface();
     let place = |v: u32| surface.vertices[v as usize].position(body.rest_positions());
     let (mut area, mut reach) = (0.0, 0.0_f64);
@@ -57,16 +57,16 @@ pub fn wound(body: &Body) -> (f64, f64) {
 }
 
 /// Mass, momentum, angular momentum and both energies.
-pub type Measures = (f64, V, V, [f64; 2]);
+pub(super) type Measures = (f64, V, V, [f64; 2]);
 
 /// Those of a body.
-pub fn measure(body: &Body) -> Measures {
+pub(super) fn measure(body: &Body) -> Measures {
     let energies = [body.kinetic_energy(), body.elastic_energy()];
     (body.total_mass(), body.momentum(), body.angular_momentum(), energies)
 }
 
 /// The largest relative change from `before` to `after` in a body of this `length` [m].
-pub fn largest_change(before: &Measures, after: &Measures, length: f64) -> f64 {
+pub(super) fn largest_change(before: &Measures, after: &Measures, length: f64) -> f64 {
     let flow = before.1.norm().max(1e-9);
     let changes = [
         (after.0 / before.0 - 1.0).abs(),

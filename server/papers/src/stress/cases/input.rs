@@ -20,7 +20,7 @@ use crate::stress::case::{Case, Setting};
 use crate::stress::evidence::Evidence;
 
 /// Case 26.
-pub const CASE: Case = Case {
+pub(super) const CASE: Case = Case {
     number: Some(26),
     name: "bad-input",
     title: "NaN, infinity, denormal and absurd numbers",

@@ -6,7 +6,7 @@ use super::touch::{Run, WORLD};
 use crate::lab::Trouble;
 
 /// Case 24.
-pub const CASE: Case = Case {
+pub(super) const CASE: Case = Case {
     number: Some(24),
     name: "tool-jab",
     title: "A tool jabs at 10 m/s",

@@ -20,7 +20,7 @@ use crate::system::model::{Grid, cube};
 use crate::system::solve::{Solver, Until, decay, rate, run};
 
 /// Case 29.
-pub const BLADES: Case = Case {
+pub(super) const BLADES: Case = Case {
     number: Some(29),
     name: "blade-grid",
     title: "A grid of blades in octree cells, multigrid",
@@ -35,7 +35,7 @@ pub const BLADES: Case = Case {
 };
 
 /// Hanging corners.
-pub const PATCH: Case = Case {
+pub(super) const PATCH: Case = Case {
     number: None,
     name: "cells-patch",
     title: "Octree cells: a linear displacement after random cuts",

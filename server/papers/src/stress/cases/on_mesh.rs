@@ -15,7 +15,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::watch::{Common, Watch, charts};
 
 /// Case 2.
-pub const NODE: Case = Case {
+pub(super) const NODE: Case = Case {
     number: Some(2),
     name: "node-on-cut",
     title: "Nodes exactly on the cut",
@@ -30,7 +30,7 @@ pub const NODE: Case = Case {
 };
 
 /// Case 3.
-pub const EDGE: Case = Case {
+pub(super) const EDGE: Case = Case {
     number: Some(3),
     name: "edge-on-cut",
     title: "Edges exactly in the cut",
@@ -50,7 +50,7 @@ pub const EDGE: Case = Case {
 };
 
 /// Case 4.
-pub const FACE: Case = Case {
+pub(super) const FACE: Case = Case {
     number: Some(4),
     name: "face-on-cut",
     title: "A layer of faces in the cut",

@@ -9,7 +9,7 @@ use super::touch::{WORLD, block};
 use crate::lab::Trouble;
 
 /// Case 31.
-pub const CASE: Case = Case {
+pub(super) const CASE: Case = Case {
     number: Some(31),
     name: "overload",
     title: "A scene five times too slow",

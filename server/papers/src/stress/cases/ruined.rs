@@ -13,7 +13,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::watch::{Common, Watch, charts};
 
 /// Case 14.
-pub const INVERTED: Case = Case {
+pub(super) const INVERTED: Case = Case {
     number: Some(14),
     name: "inverted",
     title: "Every element starts inverted",
@@ -41,7 +41,7 @@ pub const INVERTED: Case = Case {
 };
 
 /// Case 15.
-pub const COLLAPSED: Case = Case {
+pub(super) const COLLAPSED: Case = Case {
     number: Some(15),
     name: "collapsed",
     title: "All nodes in one point",
@@ -63,7 +63,7 @@ pub const COLLAPSED: Case = Case {
 };
 
 /// Case 16.
-pub const FLATTENED: Case = Case {
+pub(super) const FLATTENED: Case = Case {
     number: Some(16),
     name: "flattened",
     title: "Flattened to a plane, stretched twenty times",
@@ -79,7 +79,7 @@ pub const FLATTENED: Case = Case {
 };
 
 /// Case 17.
-pub const SCRAMBLED: Case = Case {
+pub(super) const SCRAMBLED: Case = Case {
     number: Some(17),
     name: "scrambled",
     title: "Every node at a random place",

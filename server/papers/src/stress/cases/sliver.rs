@@ -10,7 +10,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::watch::{Common, Watch, charts};
 
 /// Case 1.
-pub const CASE: Case = Case {
+pub(super) const CASE: Case = Case {
     number: Some(1),
     name: "sliver",
     title: "Slivers down to a volume fraction of 1e-15",

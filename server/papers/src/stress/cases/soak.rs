@@ -14,7 +14,7 @@ use super::touch::{WORLD, block};
 use crate::lab::Trouble;
 
 /// Case 30.
-pub const CASE: Case = Case {
+pub(super) const CASE: Case = Case {
     number: Some(30),
     name: "soak",
     title: "Random tools and cuts, with sleep and replay",

@@ -13,7 +13,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::watch::{Common, Watch, charts};
 
 /// Case 18.
-pub const STEPS: Case = Case {
+pub(super) const STEPS: Case = Case {
     number: Some(18),
     name: "step-sweep",
     title: "Steps from 0.1 ms to 0.2 s",
@@ -30,7 +30,7 @@ pub const STEPS: Case = Case {
 };
 
 /// Case 19.
-pub const SPIN: Case = Case {
+pub(super) const SPIN: Case = Case {
     number: Some(19),
     name: "free-spin",
     title: "A free spin of two seconds",
@@ -43,7 +43,7 @@ pub const SPIN: Case = Case {
 };
 
 /// Case 20.
-pub const NEWMARK: Case = Case {
+pub(super) const NEWMARK: Case = Case {
     number: Some(20),
     name: "newmark-guard",
     title: "Newmark's method is guarded",

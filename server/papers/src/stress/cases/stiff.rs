@@ -22,7 +22,7 @@ use crate::system::linear::{MATERIAL, Problem, System};
 use crate::system::solve;
 
 /// Case 21.
-pub const LAYERS: Case = Case {
+pub(super) const LAYERS: Case = Case {
     number: Some(21),
     name: "stiffness-ratio",
     title: "Stiffness ratio of a million",
@@ -37,7 +37,7 @@ pub const LAYERS: Case = Case {
 };
 
 /// Case 22.
-pub const INCOMPRESSIBLE: Case = Case {
+pub(super) const INCOMPRESSIBLE: Case = Case {
     number: Some(22),
     name: "incompressible",
     title: "Poisson's ratio 0.499",
@@ -52,7 +52,7 @@ pub const INCOMPRESSIBLE: Case = Case {
 };
 
 /// Case 23.
-pub const NEEDLES: Case = Case {
+pub(super) const NEEDLES: Case = Case {
     number: Some(23),
     name: "needles",
     title: "Needles, slivers and caps in the mesh",

@@ -12,7 +12,7 @@ use crate::stress::case::{Case, Setting};
 use crate::stress::evidence::Evidence;
 
 /// Case 28.
-pub const LIPS: Case = Case {
+pub(super) const LIPS: Case = Case {
     number: Some(28),
     name: "lips-in-contact",
     title: "The lips of a cut are opened and pressed together",
@@ -28,7 +28,7 @@ pub const LIPS: Case = Case {
 };
 
 /// A block on a slope.
-pub const INCLINE: Case = Case {
+pub(super) const INCLINE: Case = Case {
     number: None,
     name: "incline",
     title: "A block on a slope, 5 % below and above the critical angle",
@@ -42,7 +42,7 @@ pub const INCLINE: Case = Case {
 };
 
 /// A body dropped on a needle, and a large one on the floor.
-pub const NEEDLE: Case = Case {
+pub(super) const NEEDLE: Case = Case {
     number: None,
     name: "needle",
     title: "A body falls on a needle",
@@ -57,7 +57,7 @@ pub const NEEDLE: Case = Case {
 };
 
 /// The thesis' own scene of a body on the floor.
-pub const HIPPO: Case = Case {
+pub(super) const HIPPO: Case = Case {
     number: None,
     name: "falls-on-floor",
     title: "A large linear body falls on the floor with ten iterations per step",
@@ -71,7 +71,7 @@ pub const HIPPO: Case = Case {
 };
 
 /// Two bodies wedged between walls, and one that is pressed through a gap.
-pub const WEDGED: Case = Case {
+pub(super) const WEDGED: Case = Case {
     number: None,
     name: "wedged",
     title: "Bodies are wedged and pressed into a gap",
@@ -85,7 +85,7 @@ pub const WEDGED: Case = Case {
 };
 
 /// A cut that is made while its lips are pressed together.
-pub const PRESSED: Case = Case {
+pub(super) const PRESSED: Case = Case {
     number: None,
     name: "cut-while-pressed",
     title: "A block is cut while it is pressed together",

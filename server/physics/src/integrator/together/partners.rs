@@ -31,7 +31,7 @@ type Node = (u32, u32);
 
 /// Nodes that are tied to each other.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Partners {
+pub(super) struct Partners {
     ties: Vec<(Node, Node, f64)>,
     chosen: Vec<[Node; 2]>,
     /// Those of the present modes.
@@ -52,7 +52,7 @@ struct Block {
 
 impl Partners {
     /// Chooses the partners of a step among the nodes of springs that begin it in contact, the stiffest ties first.
-    pub fn choose(&mut self, members: &[Member<'_>], pairs: &[ActivePair]) {
+    pub(super) fn choose(&mut self, members: &[Member<'_>], pairs: &[ActivePair]) {
         let Self { ties, chosen, number, .. } = self;
         chosen.clear();
         ties.clear();
@@ -93,7 +93,7 @@ impl Partners {
     }
 
     /// Forgets the partners of the step.
-    pub fn end(&mut self) {
+    pub(super) fn end(&mut self) {
         for (body, node) in self.chosen.drain(..).flatten() {
             self.number[body as usize][node as usize] = NONE;
         }
@@ -102,7 +102,7 @@ impl Partners {
 
     /// Makes the blocks for the present modes of `pairs`. The blocks of single nodes must be up to date; `s` is the
     /// factor of the stiffness of each body.
-    pub fn arrange(&mut self, members: &[Member<'_>], pairs: &[ActivePair], s: impl Fn(u32) -> f64) {
+    pub(super) fn arrange(&mut self, members: &[Member<'_>], pairs: &[ActivePair], s: impl Fn(u32) -> f64) {
         let Self { chosen, blocks, number, .. } = self;
         blocks.clear();
         if members.iter().any(|member| !member.step.has_single_blocks()) {
@@ -129,7 +129,7 @@ impl Partners {
     }
 
     /// Replaces z = M⁻¹ r of all partners; returns by how much rᵀz changed.
-    pub fn precondition(&self, members: Members<'_, '_>) -> f64 {
+    pub(super) fn precondition(&self, members: Members<'_, '_>) -> f64 {
         let mut change = 0.0;
         for Block { nodes, inverse, .. } in &self.blocks {
             let mut r = Vector6::zeros();

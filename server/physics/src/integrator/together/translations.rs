@@ -10,7 +10,7 @@ const TOLERANCE: f64 = 1e-14;
 
 /// The translation equations of the free parts of a group: their masses and springs, and the springs between them.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct SharedTranslations {
+pub(super) struct SharedTranslations {
     /// Number of the first part of every member, and of the last one's end.
     first: Vec<usize>,
     /// Whether a part is free.
@@ -30,7 +30,7 @@ pub struct SharedTranslations {
 impl SharedTranslations {
     /// Moves every free part to where its momentum is balanced with the present δ, places and modes of springs.
     /// Returns whether any part is free.
-    pub fn balance(&mut self, members: &mut [Member<'_>], pairs: &[ActivePair]) -> bool {
+    pub(super) fn balance(&mut self, members: &mut [Member<'_>], pairs: &[ActivePair]) -> bool {
         if !members.iter().any(|member| member.inputs.step.parts.any_free()) {
             return false;
         }

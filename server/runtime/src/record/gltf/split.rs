@@ -6,7 +6,7 @@ use scindo_world::body::texture::Corners;
 use scindo_world::snapshot::SurfaceTopology;
 
 /// A surface whose vertices are split where the image on the skin does not go on.
-pub struct Split {
+pub(super) struct Split {
     /// Surface vertex of every vertex.
     pub source: Vec<u32>,
     /// Place on the image of every vertex; (0, 0) is the upper left corner, as glTF has it.
@@ -19,7 +19,7 @@ pub struct Split {
 
 impl Split {
     /// Splits the vertices of a surface by the texture coordinates of its skin.
-    pub fn new(surface: &SurfaceTopology, image: &[Corners]) -> Self {
+    pub(super) fn new(surface: &SurfaceTopology, image: &[Corners]) -> Self {
         let mut split =
             Self { source: Vec::new(), coordinates: Vec::new(), skin: Vec::new(), lips: Vec::new() };
         let mut known = HashMap::new();

@@ -11,7 +11,7 @@ use crate::scene::{CheckedScene, CutPath, CutSpec};
 const NEAR: f64 = 2.0;
 
 /// Cuts that pass beside their body, as it lies at the start.
-pub fn doubts(cuts: &[CutSpec], bodies: &mut [SimBody], doubts: &mut Vec<String>) {
+pub(super) fn doubts(cuts: &[CutSpec], bodies: &mut [SimBody], doubts: &mut Vec<String>) {
     for (number, cut) in cuts.iter().enumerate() {
         let Some(body) = bodies.get_mut(cut.body) else { continue };
         match &cut.blade {

@@ -18,7 +18,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Says which parts of `body` hang on nothing, and which parts no element joins to the others.
 /// `carried` tells whether something that the body touches may stop its fall.
-pub fn doubts(
+pub(super) fn doubts(
     scene: &CheckedScene,
     (spec, carried): (&BodySpec, bool),
     body: &SimBody,

@@ -18,11 +18,11 @@ const LOCKING: f64 = 0.485;
 const STRAIN: f64 = 1.0;
 
 /// What is odd about a region of another material that holds no element.
-pub const EMPTY_REGION: &str =
+pub(crate) const EMPTY_REGION: &str =
     "no element has its centre in the region, or later regions cover it; make it larger or take a finer mesh";
 
 /// Doubts about the mesh of `body` and whether its material suits it.
-pub fn doubts(spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
+pub(super) fn doubts(spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
     let at = format!("body.{}", spec.id);
     match &body.health {
         Some(MeshHealth::Surface(report)) => lattice(&at, report, doubts),

@@ -14,7 +14,7 @@ const BLADE: f64 = 10.0;
 const PLACES: usize = 16;
 
 /// Doubts about `tools` among `bodies` as they lie at the start.
-pub fn doubts(tools: &[ToolSpec], bodies: &[SimBody], doubts: &mut Vec<String>) {
+pub(super) fn doubts(tools: &[ToolSpec], bodies: &[SimBody], doubts: &mut Vec<String>) {
     let longest_m = bodies.iter().map(longest_side).fold(0.0, f64::max);
     if bodies.is_empty() {
         return;

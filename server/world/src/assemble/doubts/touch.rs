@@ -15,7 +15,7 @@ const INSIDE_CELLS: f64 = 0.05;
 const FALL_M: f64 = 1e3;
 
 /// Whether something that the body touches may stop its fall.
-pub fn may_be_carried(scene: &CheckedScene, body: &SimBody, obstacles: &[Obstacle]) -> bool {
+pub(super) fn may_be_carried(scene: &CheckedScene, body: &SimBody, obstacles: &[Obstacle]) -> bool {
     let touches = scene.effects.body_collision == Some(true) && scene.bodies.len() > 1;
     let Some(down) = scene.gravity_m_s2.try_normalize(0.0) else { return touches };
     let (low, high) = crate::body::bounds(body.body.rest_positions());
@@ -25,7 +25,7 @@ pub fn may_be_carried(scene: &CheckedScene, body: &SimBody, obstacles: &[Obstacl
 }
 
 /// Says which bodies begin in each other or in an obstacle.
-pub fn doubts(
+pub(super) fn doubts(
     scene: &CheckedScene,
     (bodies, obstacles): (&mut [SimBody], &[Obstacle]),
     doubts: &mut Vec<String>,

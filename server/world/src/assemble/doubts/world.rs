@@ -16,7 +16,7 @@ const SLUGGISH_S: f64 = 1.0;
 const FAST_TOOL: f64 = 5.0;
 
 /// Doubts that concern no single body.
-pub fn doubts(scene: &CheckedScene, bodies: &[SimBody], doubts: &mut Vec<String>) {
+pub(super) fn doubts(scene: &CheckedScene, bodies: &[SimBody], doubts: &mut Vec<String>) {
     if scene.bodies.is_empty() {
         doubts.push("the scene has no body: nothing deforms; add a [[body]]".into());
     }

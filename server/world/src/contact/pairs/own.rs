@@ -37,7 +37,7 @@ type List = SmallVec<[(f32, u32); ROOM]>;
 
 /// What one body knows about itself.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
-pub struct OwnSurface {
+pub(super) struct OwnSurface {
     /// Normals of triangles and vertices, as long as twice their area [m²].
     triangles: Vec<Vector3<f64>>,
     vertices: Vec<Vector3<f64>>,
@@ -61,14 +61,14 @@ pub struct OwnSurface {
 
 impl OwnSurface {
     /// Lets vertices meet all triangles; only for a mutation test.
-    pub fn meet_the_joined(&mut self, on: bool) {
+    pub(super) fn meet_the_joined(&mut self, on: bool) {
         self.meets_joined = on;
     }
 
     /// Whether the body with its nodes at `x` [m] is still apart from itself: no vertex that did not touch can be within
     /// `reach` [m] of a triangle to which it is not joined. It need not be updated then. No point of the surface moves
     /// farther than `spread` times the farthest node. `same` is as for [`update`](Self::update).
-    pub fn is_apart(
+    pub(super) fn is_apart(
         &self,
         (x, spread): (&[Vector3<f64>], f64),
         same: bool,
@@ -84,19 +84,19 @@ impl OwnSurface {
     }
 
     /// Takes note of a step in which all vertices were looked at: whether the body touched itself.
-    pub fn has_looked(&mut self, touched: bool) {
+    pub(super) fn has_looked(&mut self, touched: bool) {
         let least = || self.free_m.iter().copied().fold(f64::INFINITY, f64::min);
         self.least_free_m = if touched { 0.0 } else { least() };
     }
 
     /// Distance to spare that the vertices of a body look for which loses `loss` [m] of it in a step [m].
-    pub fn spare_m(loss: f64, cell_m: f64) -> f64 {
+    pub(super) fn spare_m(loss: f64, cell_m: f64) -> f64 {
         if loss < SPARE_LOSS * SPARE_CELLS * cell_m { SPARE_CELLS * cell_m } else { 0.0 }
     }
 
     /// Follows a motion of the surface and of the nodes that carry it, now at `x` [m]. `same` tells whether vertices and
     /// triangles are still those of the last update, `is_lip` which triangles are of a lip.
-    pub fn update(
+    pub(super) fn update(
         &mut self,
         tree: &SurfaceBvh,
         x: &[Vector3<f64>],
@@ -150,7 +150,7 @@ impl OwnSurface {
     }
 
     /// Whether triangle `t` faces a vertex.
-    pub fn faces(&self, t: u32, vertex: u32) -> bool {
+    pub(super) fn faces(&self, t: u32, vertex: u32) -> bool {
         if self.meets_joined {
             return true;
         }
@@ -165,7 +165,7 @@ impl OwnSurface {
     /// The normal on the rim of a lip is the mean of the lip's and the skin's. A vertex of the other rim lies opposite
     /// to it, a few micrometres below or above, and would be pushed in another direction in every step. So a rim
     /// pushes along the normal of its lip, and turns as the vertex passes beyond it.
-    pub fn push(
+    pub(super) fn push(
         &self,
         near: &ClosestPoint,
         from: Vector3<f64>,
@@ -184,13 +184,13 @@ impl OwnSurface {
     }
 
     /// Whether no triangle to which it is not joined can be within `reach` [m] of a vertex.
-    pub fn is_free(&self, vertex: u32, (reach, cell_m): (f64, f64)) -> bool {
+    pub(super) fn is_free(&self, vertex: u32, (reach, cell_m): (f64, f64)) -> bool {
         self.free_m[vertex as usize] > reach + ROUNDING_CELLS * cell_m
     }
 
     /// The closest of the triangles that face a vertex at `from` [m], of those no farther than `reach` [m] that it is
     /// not joined to. What is known of the vertex after that reaches `spare` [m] farther.
-    pub fn closest(
+    pub(super) fn closest(
         &mut self,
         (vertex, from): (u32, Vector3<f64>),
         (reach, spare, cell_m): (f64, f64, f64),

@@ -28,7 +28,7 @@ pub(super) struct Watch {
 
 impl Watch {
     /// Whether it can touch anything.
-    pub fn may_meet(&self) -> bool {
+    pub(super) fn may_meet(&self) -> bool {
         !self.apart || !self.alone
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use scindo_physics::mesh::{TET_FACES, TetMesh};
 
 /// Counts over the faces and boundary edges of a mesh.
-pub struct Connectivity {
+pub(crate) struct Connectivity {
     /// Parts connected through faces.
     pub components: usize,
     /// Faces with more than two tets.
@@ -15,7 +15,7 @@ pub struct Connectivity {
 }
 
 /// Computes the counts for a mesh.
-pub fn of(mesh: &TetMesh) -> Connectivity {
+pub(crate) fn of(mesh: &TetMesh) -> Connectivity {
     let faces = sorted_faces(mesh);
     let overfull_faces = faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 2).count();
     let mut edges: BTreeMap<[u32; 2], usize> = BTreeMap::new();
@@ -33,7 +33,7 @@ pub fn of(mesh: &TetMesh) -> Connectivity {
 }
 
 /// Component of every tet, numbered by first appearance, and the number of components.
-pub fn components(mesh: &TetMesh) -> (Vec<u32>, usize) {
+pub(crate) fn components(mesh: &TetMesh) -> (Vec<u32>, usize) {
     let neighbours = face_neighbours(mesh);
     let mut component: Vec<Option<u32>> = vec![None; mesh.tets.len()];
     let mut count = 0;

@@ -1,7 +1,7 @@
 //! Faults of a mesh, their repair, and the plausibility of its size.
 
 mod weld;
-pub mod connectivity;
-pub mod volume;
-pub mod surface;
-pub mod scale;
+pub(super) mod connectivity;
+pub(super) mod volume;
+pub(super) mod surface;
+pub(super) mod scale;

@@ -14,7 +14,7 @@ use crate::format::{MeshInError, SurfaceMesh};
 use crate::mesh_in::triangle_tree::TriangleTree;
 
 /// Largest accepted share of triangles without area.
-pub const MAX_DEGENERATE_TRIANGLES: f64 = 0.5;
+pub(crate) const MAX_DEGENERATE_TRIANGLES: f64 = 0.5;
 
 /// A triangle whose area is below this fraction of (longest edge)² has no direction.
 const FLAT_TRIANGLE: f64 = 1e-10;
@@ -64,7 +64,7 @@ impl SurfaceHealth {
 }
 
 /// A welded, consistently outward oriented surface, ready for inside tests.
-pub struct CleanSurface {
+pub(crate) struct CleanSurface {
     /// Name of the file.
     pub file: String,
     /// Tree for crossings and winding numbers.
@@ -73,7 +73,7 @@ pub struct CleanSurface {
 
 /// Welds vertices, removes useless triangles and orients the rest. `scale` converts the file's unit to
 /// metres.
-pub fn clean_surface(
+pub(crate) fn clean_surface(
     surface: &SurfaceMesh,
     scale: f64,
 ) -> Result<(CleanSurface, SurfaceHealth), MeshInError> {
@@ -282,7 +282,7 @@ fn area_normal(vertices: &[Vector3<f64>], triangle: &[u32; 3]) -> Vector3<f64> {
 }
 
 /// Volume of the cones from `apex` over all triangles [m³]. For a closed surface this is the enclosed volume.
-pub fn enclosed_volume(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], apex: Vector3<f64>) -> f64 {
+pub(crate) fn enclosed_volume(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], apex: Vector3<f64>) -> f64 {
     let cone = |t: &[u32; 3]| area_normal(vertices, t).dot(&(vertices[t[0] as usize] - apex)) / 3.0;
     triangles.iter().map(cone).sum()
 }

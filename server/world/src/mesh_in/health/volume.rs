@@ -10,7 +10,7 @@ use super::{connectivity, weld};
 use crate::format::{CellGroup, MeshInError, VolumeMesh, keep_tets};
 
 /// Largest share of useless tetrahedra that is removed. A mesh with more is refused.
-pub const MAX_DEGENERATE_TETS: f64 = 0.01;
+pub(crate) const MAX_DEGENERATE_TETS: f64 = 0.01;
 
 /// Faults of a volume mesh, and its measures after repair.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 ///
 /// Points coincide when they round to the same multiple of `tolerance`. Points on two sides of a rounding
 /// border stay apart. This is harmless, since exporters repeat coordinates exactly.
-pub fn coincident(points: &[Vector3<f64>], tolerance: f64) -> (Vec<u32>, usize) {
+pub(super) fn coincident(points: &[Vector3<f64>], tolerance: f64) -> (Vec<u32>, usize) {
     let step = if tolerance > 0.0 { tolerance } else { f64::MIN_POSITIVE };
     // Adding 0.0 turns -0.0 into 0.0.
     let rounded = |p: &Vector3<f64>| [p.x, p.y, p.z].map(|c| ((c / step).round() + 0.0).to_bits());

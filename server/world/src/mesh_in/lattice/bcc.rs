@@ -10,7 +10,7 @@
 use nalgebra::Vector3;
 
 /// A lattice over a box.
-pub struct Bcc {
+pub(super) struct Bcc {
     /// Position of corner (0, 0, 0) [m].
     pub origin: Vector3<f64>,
     /// Side of a cube [m].
@@ -21,7 +21,7 @@ pub struct Bcc {
 
 /// A lattice edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Edge {
+pub(super) struct Edge {
     /// Smaller node number.
     pub a: u32,
     /// Larger node number.
@@ -30,7 +30,7 @@ pub struct Edge {
 
 impl Edge {
     /// The edge between two nodes.
-    pub fn new(a: u32, b: u32) -> Self {
+    pub(super) fn new(a: u32, b: u32) -> Self {
         Edge { a: a.min(b), b: a.max(b) }
     }
 }
@@ -38,7 +38,7 @@ impl Edge {
 impl Bcc {
     /// A lattice with `cells` cubes along the longest side of the box, and a margin of cubes entirely outside
     /// it.
-    pub fn around(low: Vector3<f64>, high: Vector3<f64>, cells: usize) -> Self {
+    pub(super) fn around(low: Vector3<f64>, high: Vector3<f64>, cells: usize) -> Self {
         let size = high - low;
         let spacing = size.max() / cells as f64;
         let cubes = [0, 1, 2].map(|axis| (size[axis] / spacing).ceil() as usize + 3);
@@ -51,7 +51,7 @@ impl Bcc {
     }
 
     /// Number of nodes.
-    pub fn n_nodes(&self) -> usize {
+    pub(super) fn n_nodes(&self) -> usize {
         self.n_corners() + self.cubes.iter().product::<usize>()
     }
 
@@ -64,7 +64,7 @@ impl Bcc {
     }
 
     /// Position of a node [m].
-    pub fn position(&self, node: u32) -> Vector3<f64> {
+    pub(super) fn position(&self, node: u32) -> Vector3<f64> {
         let node = node as usize;
         let (index, side, shift) = match node.checked_sub(self.n_corners()) {
             None => (node, self.cubes.map(|n| n + 1), 0.0),
@@ -75,12 +75,12 @@ impl Bcc {
     }
 
     /// Whether an edge has length h (corner–corner or centre–centre).
-    pub fn is_long(&self, edge: Edge) -> bool {
+    pub(super) fn is_long(&self, edge: Edge) -> bool {
         ((edge.a as usize) < self.n_corners()) == ((edge.b as usize) < self.n_corners())
     }
 
     /// Calls `visit` for every tetrahedron, positively oriented, in a fixed order.
-    pub fn for_each_tet(&self, mut visit: impl FnMut([u32; 4])) {
+    pub(super) fn for_each_tet(&self, mut visit: impl FnMut([u32; 4])) {
         let [nx, ny, nz] = self.cubes;
         for k in 0..nz {
             for j in 0..ny {
@@ -116,7 +116,7 @@ impl Bcc {
 
     /// The edges for which `wanted` is true, each once, in a fixed order. (There are seven edges per node in
     /// all.)
-    pub fn edges(&self, wanted: impl Fn(Edge) -> bool) -> Vec<Edge> {
+    pub(super) fn edges(&self, wanted: impl Fn(Edge) -> bool) -> Vec<Edge> {
         let mut edges = Vec::new();
         let mut keep = |a: u32, b: u32| {
             let edge = Edge::new(a, b);

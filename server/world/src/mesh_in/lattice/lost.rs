@@ -12,7 +12,7 @@ use crate::mesh_in::health::surface::CleanSurface;
 const SAMPLES: usize = 4000;
 
 /// Records in `report` how much of `surface` has no element of `mesh` within a cell.
-pub fn measure(surface: &CleanSurface, mesh: &TetMesh, report: &mut LatticeReport) {
+pub(super) fn measure(surface: &CleanSurface, mesh: &TetMesh, report: &mut LatticeReport) {
     let positions: Vec<[f32; 3]> = mesh.nodes.iter().map(|x| [x.x as f32, x.y as f32, x.z as f32]).collect();
     let skin: Vec<[u32; 3]> = mesh.boundary_faces().iter().map(|face| face.nodes).collect();
     let Ok(skin) = SurfaceBvh::new(&positions, &skin) else { return };

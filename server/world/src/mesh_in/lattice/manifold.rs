@@ -16,7 +16,7 @@ use crate::mesh_in::health::connectivity::components;
 const ROUNDS: usize = 64;
 
 /// Doubles nodes and removes tets until the boundary is 2-manifold.
-pub fn make_manifold(mesh: &mut TetMesh, report: &mut LatticeReport) {
+pub(super) fn make_manifold(mesh: &mut TetMesh, report: &mut LatticeReport) {
     for _ in 0..ROUNDS {
         report.split_nodes += split_nodes(mesh);
         let doomed = pinching_tets(mesh);
@@ -30,7 +30,7 @@ pub fn make_manifold(mesh: &mut TetMesh, report: &mut LatticeReport) {
 }
 
 /// Drops face-connected components below `share` of the largest one's volume.
-pub fn drop_crumbs(mesh: &mut TetMesh, share: f64, report: &mut LatticeReport) {
+pub(super) fn drop_crumbs(mesh: &mut TetMesh, share: f64, report: &mut LatticeReport) {
     let (component, count) = components(mesh);
     let mut volumes = vec![0.0; count];
     for (e, &c) in component.iter().enumerate() {

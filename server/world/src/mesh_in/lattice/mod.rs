@@ -88,7 +88,7 @@ pub fn lattice_from_surface(
 ///
 /// # Errors
 /// Faults of the surface or the arguments, or a mesh that would not fit into memory.
-pub fn lattice_observed(
+pub(super) fn lattice_observed(
     surface: &SurfaceMesh,
     cells: usize,
     scale: f64,

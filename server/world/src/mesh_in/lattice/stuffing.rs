@@ -48,7 +48,7 @@ struct Cut {
 }
 
 /// Makes the tetrahedra of the lattice inside the surface.
-pub fn stuff(
+pub(super) fn stuff(
     lattice: &Bcc,
     surface: &CleanSurface,
     report: &mut LatticeReport,

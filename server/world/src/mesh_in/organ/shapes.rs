@@ -12,7 +12,7 @@ use super::distance::{
 
 /// A thick and a thin lobe, blended, with a groove and a notch between them and a hollow below, about
 /// 160 × 104 × 63 mm; its underside is near z = 0.
-pub fn liver(x: &Vector3<f64>) -> f64 {
+pub(super) fn liver(x: &Vector3<f64>) -> f64 {
     let right = ellipsoid(x, at(0.034, 0.004, 0.029), at(0.046, 0.052, 0.033));
     let middle = ellipsoid(x, at(-0.006, 0.006, 0.027), at(0.046, 0.046, 0.025));
     let left = ellipsoid(x, at(-0.046, 0.000, 0.024), at(0.034, 0.036, 0.015));
@@ -26,7 +26,7 @@ pub fn liver(x: &Vector3<f64>) -> f64 {
 
 /// A bean with a hollow on its inner side (+y) and a growth on top of one end, 112 × 66 × 48 mm, from
 /// z = 0 up.
-pub fn kidney(x: &Vector3<f64>) -> f64 {
+pub(super) fn kidney(x: &Vector3<f64>) -> f64 {
     // Bent about z: the ends lie farther along +y than the middle.
     let bent = at(x.x, x.y - 5.0 * x.x * x.x + 0.008, x.z);
     let bean = ellipsoid(&bent, at(0.0, 0.0, 0.022), at(0.056, 0.029, 0.022));
@@ -37,7 +37,7 @@ pub fn kidney(x: &Vector3<f64>) -> f64 {
 
 /// A hollow tube that forks into two, 120 × 84 × 20 mm with walls of 4 to 5 mm, open at its three ends;
 /// its axis is at z = 0.
-pub fn vessel(x: &Vector3<f64>) -> f64 {
+pub(super) fn vessel(x: &Vector3<f64>) -> f64 {
     const FORK: f64 = -0.004;
     let ends = [at(0.075, 0.036, 0.0), at(0.075, -0.036, 0.0)];
     let tube = |trunk: f64, branch: f64, blend: f64| {
@@ -54,7 +54,7 @@ pub fn vessel(x: &Vector3<f64>) -> f64 {
 }
 
 /// A dome 5 mm thick over a ring, with an opening beside its top, 132 × 132 × 38 mm, from z = 0 up.
-pub fn diaphragm(x: &Vector3<f64>) -> f64 {
+pub(super) fn diaphragm(x: &Vector3<f64>) -> f64 {
     // A sphere's cap of 60 mm radius and 30 mm height.
     let (radius, centre) = (0.075, at(0.0, 0.0, -0.040));
     let shell = ((x - centre).norm() - radius).abs() - 0.0025;
@@ -66,7 +66,7 @@ pub fn diaphragm(x: &Vector3<f64>) -> f64 {
 
 /// A muscle's belly between two tendons, one of which divides into three, 190 × 62 × 34 mm; its axis is
 /// at z = 0.
-pub fn tendon(x: &Vector3<f64>) -> f64 {
+pub(super) fn tendon(x: &Vector3<f64>) -> f64 {
     let belly = ellipsoid(x, at(0.0, 0.0, 0.0), at(0.046, 0.021, 0.017));
     let single = cone(x, (at(-0.030, 0.0, 0.0), 0.010), (at(-0.090, 0.0, 0.0), 0.0070));
     let foot = ellipsoid(x, at(-0.088, 0.0, 0.0), at(0.010, 0.016, 0.012));
@@ -77,7 +77,7 @@ pub fn tendon(x: &Vector3<f64>) -> f64 {
 }
 
 /// A half dome with winding folds, 132 × 92 × 62 mm, flat below at z = 0.
-pub fn brain(x: &Vector3<f64>) -> f64 {
+pub(super) fn brain(x: &Vector3<f64>) -> f64 {
     let dome = ellipsoid(x, at(0.0, 0.0, 0.016), at(0.066, 0.046, 0.046));
     // Winding folds about 16 mm apart that meet; none on the underside.
     let k = 2.0 * PI / 0.034;
@@ -92,7 +92,7 @@ pub fn brain(x: &Vector3<f64>) -> f64 {
 }
 
 /// The last joint of a finger, pad up, 62 × 36 × 30 mm, from z = 0 up.
-pub fn fingertip(x: &Vector3<f64>) -> f64 {
+pub(super) fn fingertip(x: &Vector3<f64>) -> f64 {
     let joint = cone(x, (at(-0.034, 0.0, 0.014), 0.0145), (at(0.014, 0.0, 0.014), 0.0140));
     let pad = ellipsoid(x, at(0.008, 0.0, 0.0175), at(0.024, 0.0165, 0.0135));
     let nail = ellipsoid(x, at(0.016, 0.0, -0.006), at(0.018, 0.017, 0.010));

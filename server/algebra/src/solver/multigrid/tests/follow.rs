@@ -13,13 +13,13 @@ use crate::solver::multigrid::matrices::CellMatrix;
 use crate::solver::multigrid::{Hierarchy, Multigrid, MultigridSettings};
 
 /// Cells of coarse levels, by level: `pairs[l][id]` is the number in the second hierarchy.
-pub struct Pairs {
+pub(super) struct Pairs {
     pub cells: Vec<Vec<u32>>,
     pub vertices: Vec<Vec<u32>>,
 }
 
 /// Finds which cells and vertices of two hierarchies of one octree are the same, and compares everything else.
-pub fn matched(followed: &Hierarchy, new: &Hierarchy) -> Pairs {
+pub(super) fn matched(followed: &Hierarchy, new: &Hierarchy) -> Pairs {
     let n = followed.n_levels();
     assert_eq!(n, new.n_levels());
     let mut pairs = Pairs { cells: Vec::new(), vertices: Vec::new() };
@@ -103,7 +103,7 @@ pub fn matched(followed: &Hierarchy, new: &Hierarchy) -> Pairs {
 }
 
 /// Random links of a body, some of them along planes, so that parts come apart.
-pub fn random_links(octree: &Octree, round: usize, seed: usize) -> Vec<LinkKey> {
+pub(super) fn random_links(octree: &Octree, round: usize, seed: usize) -> Vec<LinkKey> {
     let n = octree.lattice().size.map(|n| n as i32);
     let pick = |k: usize, n: i32| ((noise(k, seed + 100 * round) + 1.0) / 2.0 * f64::from(n)) as i32;
     let axis = pick(0, 3) as usize;
@@ -123,7 +123,7 @@ pub fn random_links(octree: &Octree, round: usize, seed: usize) -> Vec<LinkKey> 
     links
 }
 
-pub fn cut_links(octree: &mut Octree, links: &[LinkKey]) -> Vec<u32> {
+pub(super) fn cut_links(octree: &mut Octree, links: &[LinkKey]) -> Vec<u32> {
     let cuts: Vec<_> = links.iter().map(|&(at, axis)| cut_at(at, axis)).collect();
     octree.cut(&cuts).cells
 }

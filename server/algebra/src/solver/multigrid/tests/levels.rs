@@ -9,7 +9,7 @@ use crate::solver::multigrid::Hierarchy;
 use crate::solver::multigrid::transfer::carriers;
 
 /// An adaptive body with cuts along random links.
-pub fn random_cuts(cells: u32, levels: u8, share: f64, seed: usize) -> Octree {
+pub(super) fn random_cuts(cells: u32, levels: u8, share: f64, seed: usize) -> Octree {
     let mut octree = cube(cells, levels);
     let n = cells as i32;
     let mut cuts = Vec::new();

@@ -1,6 +1,6 @@
 //! Tests of multigrid against brute force, stored numbers and known rates.
 
-pub mod support;
+pub(super) mod support;
 mod follow;
 mod galerkin;
 mod levels;

@@ -15,32 +15,32 @@ use crate::solver::multigrid::galerkin::Galerkin;
 use crate::solver::multigrid::operator::CellProducts;
 use crate::solver::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
 
-pub type V3 = Vector3<f64>;
+pub(crate) type V3 = Vector3<f64>;
 
-pub fn cube(cells: u32, levels: u8) -> Octree {
+pub(crate) fn cube(cells: u32, levels: u8) -> Octree {
     let shape = BoxShape { min: V3::zeros(), max: V3::repeat(1.0) };
     Octree::fill(&shape, OctreeSettings { cells, levels }, &|_| 0).unwrap()
 }
 
 /// A number between −1 and 1.
-pub fn noise(i: usize, seed: usize) -> f64 {
+pub(crate) fn noise(i: usize, seed: usize) -> f64 {
     let x = (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add((seed as u64) << 17);
     let x = (x ^ x >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     ((x ^ x >> 32) & 0xFFFF_FFFF) as f64 / 2_147_483_648.0 - 1.0
 }
 
-pub fn vector(n: usize, seed: usize) -> Vec<V3> {
+pub(crate) fn vector(n: usize, seed: usize) -> Vec<V3> {
     (0..n).map(|i| V3::new(noise(3 * i, seed), noise(3 * i + 1, seed), noise(3 * i + 2, seed))).collect()
 }
 
 /// The cut of one link.
-pub fn cut_at(at: [i32; 3], axis: u8) -> (LinkKey, CutLink) {
+pub(crate) fn cut_at(at: [i32; 3], axis: u8) -> (LinkKey, CutLink) {
     let normal = V3::ith(usize::from(axis), 1.0);
     ((at, axis), CutLink { at: [0.5; 2], normal: [normal; 2], incision: 1 })
 }
 
 /// Planes across x and y between cells `planes` − 1 and `planes`, from the top down to half the height.
-pub fn blade_grid(octree: &mut Octree, planes: &[i32]) {
+pub(crate) fn blade_grid(octree: &mut Octree, planes: &[i32]) {
     let n = octree.lattice().size.map(|n| n as i32);
     let mut cuts = Vec::new();
     for &i in planes {
@@ -55,7 +55,7 @@ pub fn blade_grid(octree: &mut Octree, planes: &[i32]) {
 }
 
 /// Cuts by `n` planes in either direction, turned by 30° about z, from the top down to half the height.
-pub fn turned_blades(mut octree: Octree, n: u32) -> Octree {
+pub(crate) fn turned_blades(mut octree: Octree, n: u32) -> Octree {
     let at = octree.rest_positions();
     let (low, high) = at.iter().fold((at[0], at[0]), |(low, high), x| (low.inf(x), high.sup(x)));
     let (centre, side) = (0.5 * (low + high), high.x - low.x);
@@ -75,12 +75,12 @@ pub fn turned_blades(mut octree: Octree, n: u32) -> Octree {
 }
 
 /// The vertices with lattice coordinate 0 along `axis`, held in all directions.
-pub fn clamped(octree: &Octree, axis: usize) -> Vec<FixedCopy> {
+pub(crate) fn clamped(octree: &Octree, axis: usize) -> Vec<FixedCopy> {
     let low = (0_u32..).zip(octree.points()).filter(|(_, p)| p[axis] == 0);
     low.map(|(copy, _)| FixedCopy { copy, held: [true; 3].into(), position_m: [0.0; 3] }).collect()
 }
 
-pub fn coefficients(poisson: f64, mass_factor: f64) -> Coefficients {
+pub(crate) fn coefficients(poisson: f64, mass_factor: f64) -> Coefficients {
     let E = 1e6;
     let lame = Lame {
         mu: E / (2.0 * (1.0 + poisson)),
@@ -90,7 +90,7 @@ pub fn coefficients(poisson: f64, mass_factor: f64) -> Coefficients {
 }
 
 /// A of the finest level in double precision, cell by cell.
-pub struct Exact {
+pub(crate) struct Exact {
     pub octree: Octree,
     pub rotations: Vec<Matrix3<f64>>,
     K: Vec<[[f64; 24]; 24]>,
@@ -101,7 +101,7 @@ pub struct Exact {
 }
 
 impl Exact {
-    pub fn new(octree: &Octree, with: &Coefficients, fixed: &[FixedCopy]) -> Self {
+    pub(crate) fn new(octree: &Octree, with: &Coefficients, fixed: &[FixedCopy]) -> Self {
         let n = octree.cells().len();
         let mut mass = vec![0.0; octree.n_vertices()];
         for id in 0..n {
@@ -125,7 +125,7 @@ impl Exact {
     }
 
     /// Turns every cell about `axis` by an angle [rad] that depends on its place.
-    pub fn turn(&mut self, angle: impl Fn(V3) -> V3) {
+    pub(crate) fn turn(&mut self, angle: impl Fn(V3) -> V3) {
         let octree = &self.octree;
         let lattice = octree.lattice();
         for (R, cell) in self.rotations.iter_mut().zip(octree.cells()) {
@@ -133,18 +133,18 @@ impl Exact {
         }
     }
 
-    pub fn rotation(&self, id: u32) -> Matrix3<f32> {
+    pub(crate) fn rotation(&self, id: u32) -> Matrix3<f32> {
         self.rotations[id as usize].map(|r| r as f32)
     }
 
-    pub fn filter(&self, v: &mut [V3]) {
+    pub(crate) fn filter(&self, v: &mut [V3]) {
         for f in &self.fixed {
             f.held.clear(&mut v[f.copy as usize]);
         }
     }
 
     /// A x with prescribed directions filtered out.
-    pub fn apply(&self, x: &[V3]) -> Vec<V3> {
+    pub(crate) fn apply(&self, x: &[V3]) -> Vec<V3> {
         let mut x = x.to_vec();
         self.filter(&mut x);
         let mut y: Vec<V3> = x.iter().zip(&self.mass).map(|(x, m)| *m * x).collect();
@@ -195,7 +195,7 @@ impl Flat for [V3; 8] {
 }
 
 /// A of the finest level in single precision.
-pub struct Fine {
+pub(crate) struct Fine {
     hierarchy: Hierarchy,
     galerkin: Galerkin,
     products: CellProducts,
@@ -205,7 +205,7 @@ pub struct Fine {
 }
 
 impl Fine {
-    pub fn new(team: &mut Team, exact: &Exact, with: &Coefficients) -> Self {
+    pub(crate) fn new(team: &mut Team, exact: &Exact, with: &Coefficients) -> Self {
         let mut hierarchy = Hierarchy::with(&exact.octree, usize::MAX, true);
         hierarchy.list_finest_slots();
         let mut galerkin = Galerkin::new(&hierarchy);
@@ -218,11 +218,11 @@ impl Fine {
         Self { hierarchy, galerkin, products, fixed: exact.fixed.clone(), springs: Vec::new(), jacobi }
     }
 
-    pub fn fixed(&self) -> &[FixedCopy] {
+    pub(crate) fn fixed(&self) -> &[FixedCopy] {
         &self.fixed
     }
 
-    pub fn inverses(&mut self) -> Vec<Inverse3> {
+    pub(crate) fn inverses(&mut self) -> Vec<Inverse3> {
         self.jacobi.inverses_mut().to_vec()
     }
 }
@@ -239,7 +239,7 @@ impl LinearOperator for Fine {
 }
 
 /// A body with everything that solves it.
-pub struct Scene {
+pub(crate) struct Scene {
     pub team: Team,
     pub exact: Exact,
     pub with: Coefficients,
@@ -250,7 +250,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    pub fn new(
+    pub(crate) fn new(
         octree: &Octree,
         with: Coefficients,
         fixed: &[FixedCopy],
@@ -259,7 +259,12 @@ impl Scene {
         Self::of(Exact::new(octree, &with, fixed), with, Hierarchy::with(octree, 600, true), settings)
     }
 
-    pub fn of(exact: Exact, with: Coefficients, hierarchy: Hierarchy, settings: MultigridSettings) -> Self {
+    pub(crate) fn of(
+        exact: Exact,
+        with: Coefficients,
+        hierarchy: Hierarchy,
+        settings: MultigridSettings,
+    ) -> Self {
         let mut team = Team::new(1).unwrap();
         let mut fine = Fine::new(&mut team, &exact, &with);
         let inverse = fine.inverses();
@@ -269,21 +274,21 @@ impl Scene {
         scene
     }
 
-    pub fn update(&mut self) {
+    pub(crate) fn update(&mut self) {
         let Self { team, exact, with, fine, inverse, multigrid, .. } = self;
         multigrid.update(team, (with, &exact.fixed), &|id| exact.rotation(id));
         multigrid.estimate_eigenvalues(team, fine, inverse);
     }
 
     /// Prolongs trilinearly in thin cells, too.
-    pub fn lock(&mut self) {
+    pub(crate) fn lock(&mut self) {
         self.multigrid.galerkin = Galerkin::new(self.multigrid.hierarchy());
         self.multigrid.galerkin.trilinear = true;
         self.update();
     }
 
     /// Adds springs to the finest level; `largest` is the bound of its largest eigenvalue then.
-    pub fn add_springs(&mut self, springs: &[Spring], largest: f64) {
+    pub(crate) fn add_springs(&mut self, springs: &[Spring], largest: f64) {
         let mut diagonal = vec![[0.0; 8]; self.exact.mass.len()];
         let operator = self.fine.galerkin.operator(&self.fine.hierarchy.levels[0], 0);
         diagonal.iter_mut().enumerate().for_each(|(v, block)| *block = operator.diagonal(v));
@@ -299,7 +304,7 @@ impl Scene {
     }
 
     /// Adds springs to the finest level that all levels take.
-    pub fn add_stiff_springs(&mut self, springs: &[Spring]) {
+    pub(crate) fn add_stiff_springs(&mut self, springs: &[Spring]) {
         self.exact.springs = springs.to_vec();
         self.fine.springs = springs.to_vec();
         let inverse = &self.inverse;
@@ -307,7 +312,7 @@ impl Scene {
     }
 
     /// V r, scaled into the range of single precision.
-    pub fn cycle(&mut self, r: &[V3]) -> Vec<V3> {
+    pub(crate) fn cycle(&mut self, r: &[V3]) -> Vec<V3> {
         let scale = 1.0 / r.iter().map(|r| r.amax()).fold(f64::MIN_POSITIVE, f64::max);
         let r: Vec<Padded> = r.iter().map(|r| padded(&(scale * r))).collect();
         let mut z = vec![[0.0; 4]; r.len()];
@@ -320,7 +325,7 @@ impl Scene {
 
     /// Iterations of conjugate gradients in double precision, preconditioned by the cycle, until the true
     /// residual of A x = b has fallen by `tolerance`, from x = 0; and x.
-    pub fn mg_pcg(&mut self, b: &[V3], tolerance: f64) -> (u32, Vec<V3>) {
+    pub(crate) fn mg_pcg(&mut self, b: &[V3], tolerance: f64) -> (u32, Vec<V3>) {
         let mut x = vec![V3::zeros(); b.len()];
         let mut r = b.to_vec();
         self.exact.filter(&mut r);
@@ -347,7 +352,7 @@ impl Scene {
     }
 
     /// Factor by which a cycle reduces the error in the norm of A, late in the iteration.
-    pub fn rate(&mut self) -> f64 {
+    pub(crate) fn rate(&mut self) -> f64 {
         let mut e = vector(self.exact.mass.len(), 5);
         self.exact.filter(&mut e);
         let mut norms = Vec::new();
@@ -361,12 +366,12 @@ impl Scene {
     }
 
     /// Loads of gravity along −z [N].
-    pub fn gravity(&self) -> Vec<V3> {
+    pub(crate) fn gravity(&self) -> Vec<V3> {
         let volumes = self.exact.octree.vertex_volumes();
         volumes.iter().map(|v| V3::new(0.0, 0.0, -9810.0 * v)).collect()
     }
 }
 
-pub fn dot(a: &[V3], b: &[V3]) -> f64 {
+pub(crate) fn dot(a: &[V3], b: &[V3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
