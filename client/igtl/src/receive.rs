@@ -25,14 +25,14 @@ pub enum Order {
     Get {
         /// The type.
         what: String,
-        /// The device.
+        /// Name of the device that is asked for.
         device: String,
     },
     /// A stream of messages.
     Start {
         /// The type.
         what: String,
-        /// The device.
+        /// Name of the device that is asked for.
         device: String,
         /// Shortest time between two messages.
         period: Duration,
@@ -41,7 +41,7 @@ pub enum Order {
     Stop {
         /// The type.
         what: String,
-        /// The device.
+        /// Name of the device that is asked for.
         device: String,
     },
 }

@@ -52,7 +52,7 @@ pub enum Up {
     Rpc {
         /// Number of the calling browser.
         browser: u64,
-        /// The call.
+        /// What the page asks the server for.
         call: ViewerRpc,
     },
     /// The mouse tool was put away, or its browser has left.

@@ -34,7 +34,6 @@ const WALL_N_M: f32 = 300.0;
 enum Scene {
     /// Nothing is there, so that a hand that feels nothing yet may begin to.
     Free,
-    /// The wall.
     Wall,
     /// Planes that are made up, and made up anew with the share of messages.
     MadeUp(Vec<Contact>, f64),

@@ -39,7 +39,7 @@ pub enum EpisodeError {
 /// What an episode was.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Outcome {
-    /// Its seed.
+    /// Seed of the random numbers, which repeats the episode.
     pub seed: u64,
     /// Messages on all links.
     pub messages: u64,
@@ -71,7 +71,6 @@ struct Seat {
 enum Token {
     /// It arrives at this time [ns].
     Comes(u64),
-    /// It is there.
     There,
     /// The link is down since then [ns].
     Fading(u64),

@@ -8,9 +8,9 @@ use crate::table::Mutant;
 /// A promise.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Guarantee {
-    /// Its number.
+    /// Its number in the list of guarantees.
     pub number: &'static str,
-    /// What is promised.
+    /// What is promised, in one sentence.
     pub promise: &'static str,
     /// What tries to break it.
     pub tried_by: &'static str,

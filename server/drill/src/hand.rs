@@ -48,7 +48,7 @@ pub enum Fate {
 
 /// A client with a device.
 pub struct HandClient {
-    /// Its id.
+    /// The client id under which it speaks.
     pub id: Chunk,
     /// The tool that it wants to hold.
     pub tool: Chunk,

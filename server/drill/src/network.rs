@@ -18,7 +18,7 @@ pub struct Packet {
     pub key: String,
     /// Encoding that its sender states.
     pub encoding: String,
-    /// Content.
+    /// The encoded message.
     pub content: Bytes,
     /// It is never spoiled. A wrong bit in the answer to a cut makes it another answer, which nobody could tell; TCP
     /// lets no such bit pass.

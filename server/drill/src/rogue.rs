@@ -12,7 +12,7 @@ const MEMORY: usize = 32;
 
 /// The liar.
 pub struct Rogue {
-    /// Its id.
+    /// The client id under which it speaks.
     pub id: Chunk,
     keys: KeySpace,
     seen: Vec<Packet>,

@@ -38,7 +38,7 @@ pub enum RuntimeError {
          `cargo build --release -p {program}`, or install the package, which holds both"
     )]
     NoSibling {
-        /// The program.
+        /// The program that was looked for beside this one.
         program: &'static str,
         /// The command that it runs.
         command: &'static str,
@@ -99,7 +99,7 @@ pub enum RuntimeError {
     /// A recording cannot be written.
     #[error("cannot record into {file}: {reason}. Choose another file with --record; it must not exist yet")]
     Recording {
-        /// The file.
+        /// The recording that cannot be read.
         file: String,
         /// What went wrong.
         reason: String,
@@ -109,7 +109,7 @@ pub enum RuntimeError {
         "{file} is no recording that can be read: {reason}. Give a file that `scindo run --record` wrote"
     )]
     NoRecording {
-        /// The file.
+        /// The file that was named.
         file: String,
         /// What went wrong.
         reason: String,
@@ -123,7 +123,7 @@ pub enum RuntimeError {
     /// An exported file cannot be written.
     #[error("cannot write {file}: {reason}. Check that the directory exists and is writable")]
     Export {
-        /// The file.
+        /// The file that cannot be written.
         file: String,
         /// What went wrong.
         reason: String,

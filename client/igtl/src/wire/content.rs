@@ -35,7 +35,7 @@ pub struct Transform(pub [f32; 12]);
 pub struct Tracked {
     /// Name of the tool.
     pub name: String,
-    /// Where it is.
+    /// From the tool's axes to those of the world.
     pub transform: Transform,
 }
 

@@ -34,9 +34,9 @@ const NORMALS: &[u8; 8] = b"Normals\0";
     "a surface of {points} points and {triangles} triangles takes {bytes} bytes; at most {MAX_BODY_OUT} are sent"
 )]
 pub struct TooLarge {
-    /// Points.
+    /// Points of the surface.
     pub points: usize,
-    /// Triangles.
+    /// Triangles of the surface.
     pub triangles: usize,
     /// Bytes of the message.
     pub bytes: usize,

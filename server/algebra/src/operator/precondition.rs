@@ -64,7 +64,7 @@ pub trait Preconditioner {
 pub struct Iterate<'a> {
     /// The solution x.
     pub x: &'a mut [Padded],
-    /// The residual r.
+    /// b − A x, by recurrence.
     pub r: &'a mut [Padded],
     /// z = M⁻¹ r.
     pub z: &'a mut [Padded],

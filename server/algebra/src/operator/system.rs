@@ -10,7 +10,7 @@ use super::{Advance, BLOCK, Block6, LinearOperator, Padded, Substitution, block_
 /// Stiffness along `direction` between a material point and the world, or in all directions.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Spring {
-    /// The point.
+    /// The material point that it pulls at.
     pub point: MaterialPoint<f32>,
     /// Unit vector of the stiff direction, or `None` if all three are stiff.
     pub direction: Option<[f32; 3]>,

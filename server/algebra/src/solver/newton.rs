@@ -113,7 +113,7 @@ pub struct NewtonReport {
     pub residual: f64,
     /// The reference itself [√J]: the norm of the loads, or of the first gradient.
     pub reference: f64,
-    /// Why it stopped.
+    /// What ended the iteration.
     pub stop: StopReason,
     /// Halvings of all line searches.
     pub backtracks: u32,

@@ -28,7 +28,7 @@ pub struct LinearReport {
     pub iterations: u32,
     /// √(rᵀM⁻¹r) of the true residual b − A x, over the reference.
     pub residual: f64,
-    /// Why it stopped.
+    /// What ended the iteration.
     pub stop: StopReason,
     /// Estimate of the algebraic error ‖x* − x‖_A, [√J] where A is a stiffness [N/m].
     pub algebraic_error: f64,

@@ -78,7 +78,6 @@ impl Index {
         index
     }
 
-    /// The method.
     pub(crate) fn method(&self) -> Method {
         match self {
             Self::AabbTree(_) => Method::AabbTree,

@@ -22,7 +22,7 @@ pub struct MarkPoint {
 /// A straight line on the surface, along an incision that has not opened there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IncisionMark {
-    /// The incision.
+    /// Number of the incision that it belongs to.
     pub incision: u32,
     /// Start and end of the line.
     pub ends: [MarkPoint; 2],

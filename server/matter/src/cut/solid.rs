@@ -16,7 +16,7 @@ use crate::element::MaterialPoint;
 pub struct Solid {
     /// Points of the material. The two sides of a cut have separate points.
     pub vertices: Vec<MaterialPoint>,
-    /// The cells.
+    /// Tetrahedra or cells, on these vertices.
     pub cells: SolidCells,
     /// Where each cell comes from.
     pub origins: Vec<SolidOrigin>,

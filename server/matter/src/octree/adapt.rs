@@ -35,11 +35,11 @@ pub struct AdaptSettings {
 /// A criterion out of range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptError {
-    /// Its name.
+    /// The setting, as scenes write it.
     pub name: &'static str,
     /// Its two values.
     pub found: [f64; 2],
-    /// What is allowed.
+    /// Its range, in words.
     pub allowed: &'static str,
 }
 

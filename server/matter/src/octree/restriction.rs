@@ -99,7 +99,7 @@ impl<'a> Restriction<'a> {
         Self { change, rows, unknowns, mass: mass_before, mass_after, diagonal, held, cluster }
     }
 
-    /// What changed.
+    /// What coarsening did to cells and vertices.
     pub fn change(&self) -> &Coarsening {
         self.change
     }

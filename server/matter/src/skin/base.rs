@@ -21,7 +21,6 @@ pub(super) struct BaseFace {
 /// All boundary faces of the uncut mesh.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Base {
-    /// The faces.
     pub faces: Vec<BaseFace>,
     /// Number of distinct edges.
     pub n_edges: usize,

@@ -199,7 +199,6 @@ impl Sheet {
 
 /// A place on a boundary face.
 pub(super) struct Target {
-    /// The face.
     pub f: u32,
     /// Barycentric coordinates on the face.
     pub w: [f64; 3],

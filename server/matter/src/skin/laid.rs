@@ -40,7 +40,7 @@ impl LaidPoint {
 /// A surface that was laid on another one.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Laid {
-    /// Its points.
+    /// Where each vertex of the skin rests.
     pub points: Vec<LaidPoint>,
     /// Its triangles, in the order of the triangles of the ground below them.
     pub triangles: Vec<[u32; 3]>,

@@ -139,7 +139,6 @@ struct Way {
 struct Crossing {
     /// The face that is left.
     face: u32,
-    /// Its side.
     side: usize,
     /// Where, as a share of that side.
     share: f64,

@@ -21,7 +21,6 @@ const LONGEST: usize = 16;
 /// A part of a path over one boundary face, between two points that an edge of the skin joins.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
-    /// The face.
     pub face: u32,
     /// The points.
     pub ends: [u32; 2],

@@ -28,7 +28,6 @@ pub(super) type Claim = (u32, [u64; 3]);
 /// A closed triangulation; half-edge 3·t + k runs from corner k to the next of triangle t.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Sheet {
-    /// The points.
     pub points: Vec<Point>,
     /// Points of each triangle, counter-clockwise seen from outside.
     pub corners: Vec<[u32; 3]>,

@@ -9,9 +9,9 @@ use serde::Deserialize;
 pub struct Paper {
     /// Stable name, also of its page.
     pub id: String,
-    /// Title.
+    /// Title of the paper.
     pub title: String,
-    /// Authors.
+    /// Authors as the paper prints them.
     pub authors: String,
     /// Year of publication.
     pub year: u32,
@@ -48,7 +48,7 @@ pub enum Good {
 pub struct Number {
     /// Table, figure or section.
     pub place: String,
-    /// What it is.
+    /// The quantity, in the paper's words.
     pub what: String,
     /// Its value.
     pub printed: f64,

@@ -31,9 +31,9 @@ pub enum Pull {
 /// What of a cut lies inside elements, a third of a cell beside their faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Inside {
-    /// Its plane.
+    /// Whether its plane does.
     pub plane: bool,
-    /// Its front.
+    /// Whether its front does.
     pub front: bool,
 }
 

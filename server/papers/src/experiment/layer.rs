@@ -99,7 +99,6 @@ pub(super) fn layer(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
 
 /// A body after its steps.
 pub(super) struct Rods {
-    /// The body.
     pub body: Body,
     /// Leaves before and after the cut.
     pub cells: [f64; 2],

@@ -59,7 +59,6 @@ use scindo_study::report::result::ExperimentResult;
 
 use crate::lab::{ExperimentBench, Trouble};
 
-/// An experiment.
 type Experiment = fn(&mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.

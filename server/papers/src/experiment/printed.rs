@@ -65,7 +65,6 @@ pub(super) const BUNNY_3: Printed = Printed {
     gradients: [0.655, 0.172],
 };
 
-/// The armadillo.
 pub(super) const ARMADILLO: Printed = Printed {
     name: "Armadillo",
     cells: [493e3, 3717e3, 643e3],
@@ -78,7 +77,6 @@ pub(super) const ARMADILLO: Printed = Printed {
 /// A picture whose caption prints cells, and seconds of cutting and step together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Picture {
-    /// Its number.
     pub name: &'static str,
     /// Hexahedra before the cut, if printed, and after it.
     pub cells: [Option<f64>; 2],

@@ -183,13 +183,9 @@ fn entry(name: &str, solid: Option<&dyn Shape>, quick: bool) -> Result<Entry, Tr
 
 /// Stiffness numbers with which three cycles reduce the error as printed.
 pub(super) const S_BUNNY: f64 = 34_950.0;
-/// Likewise.
 pub(super) const S_CUBE: f64 = 970.0;
-/// Likewise.
 const S_ARMADILLO: f64 = 15_770.0;
-/// Likewise.
 pub(super) const S_BUNNY_2: f64 = 13_250.0;
-/// Likewise.
 pub(super) const S_BUNNY_3: f64 = 4_110.0;
 
 /// One step: seconds of the parts, and of three cycles.

@@ -19,7 +19,7 @@ use super::trial::{LIMITS, PERIOD_OF_PRESSES_MS, press_over};
 use crate::lab::Trouble;
 use crate::stress::{Case, Evidence, Setting};
 
-/// The cases.
+/// Cases of the truth table, in its order.
 pub const CASES: &[Case] = &[PACKETS, WALL];
 
 /// One millisecond [ns].

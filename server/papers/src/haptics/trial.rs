@@ -41,7 +41,7 @@ pub(super) const LIMITS: Limits = Limits { max_force_n: 2.5, slew_n_s: 50.0 };
 /// What a cell of the table varies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
-    /// The hand.
+    /// Stiffness, damping and mass of the hand that holds the device.
     pub hand: Hand,
     /// Round trip of the link, half of it each way [ms].
     pub delay_ms: u64,
@@ -65,7 +65,7 @@ impl Cell {
 pub struct Trial {
     /// What was varied.
     pub cell: Cell,
-    /// Its figures.
+    /// What is compared with the promise.
     pub figures: Figures,
     /// Every tick.
     pub samples: Vec<Sample>,

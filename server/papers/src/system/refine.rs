@@ -21,7 +21,7 @@ const ROUNDS: usize = 12;
 /// A refined solution, and what it cost.
 #[derive(Clone, Debug, Default)]
 pub struct Refined {
-    /// The solution.
+    /// Displacements of the nodes [m].
     pub u: Vec<V>,
     /// ‖b − A u‖/‖b‖ in double precision.
     pub left: f64,

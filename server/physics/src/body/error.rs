@@ -60,7 +60,7 @@ pub enum BodyError {
         name: &'static str,
         /// Values found.
         found: [f64; 2],
-        /// What is allowed.
+        /// The range, in words.
         allowed: &'static str,
     },
     /// The threads could not be started.
@@ -69,7 +69,7 @@ pub enum BodyError {
     /// A node that the mesh does not have.
     #[error("node {node} does not exist, the mesh has nodes 0..{n_nodes}")]
     NoSuchNode {
-        /// Node found.
+        /// The node that was asked for.
         node: u32,
         /// Number of nodes.
         n_nodes: usize,
@@ -87,7 +87,7 @@ pub enum BodyError {
         "part {part} ({mass_kg:.3e} kg) is fixed nowhere, so it has no static equilibrium; fix it or use dynamics"
     )]
     LoosePart {
-        /// Part number.
+        /// Number of the part that nothing holds.
         part: usize,
         /// Its mass [kg].
         mass_kg: f64,

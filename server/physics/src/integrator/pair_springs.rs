@@ -16,7 +16,7 @@ use super::springs::{SpringKind, SpringLaw};
 pub struct PairSpring {
     /// Number of the point's body in the group, and of the triangle's.
     pub bodies: [u32; 2],
-    /// The point.
+    /// The material point that it pulls at.
     pub point: MaterialPoint,
     /// Corners of the triangle.
     pub corners: [MaterialPoint; 3],

@@ -21,7 +21,7 @@ pub struct RelaxationReport {
     pub iterations: u32,
     /// √(gᵀM⁻¹g) over that of the loads (of the first gradient, where that is larger).
     pub residual: f64,
-    /// Why it stopped.
+    /// What ended the iteration.
     pub stop: StopReason,
     /// Whether the search started anew, because something was changed from outside.
     pub restarted: bool,

@@ -66,7 +66,6 @@ impl StepInputs<'_> {
 /// Inputs of a step by linear solves.
 #[derive(Clone, Copy, Debug)]
 pub struct LinearInputs<'a> {
-    /// The step.
     pub step: StepInputs<'a>,
     /// Mass of every copy [kg] in single precision.
     pub mass_f32: &'a [f32],

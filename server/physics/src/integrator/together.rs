@@ -35,13 +35,13 @@ const NOWHERE: u32 = u32::MAX;
 
 /// One body of a group.
 pub struct Member<'a> {
-    /// Its step.
+    /// The step of this body.
     pub step: &'a mut LinearStep,
     /// Its threads.
     pub team: &'a mut Team,
     /// Its stiffness.
     pub elastic: &'a mut dyn Stiffness,
-    /// Its state.
+    /// Its positions and velocities.
     pub state: &'a mut State,
     /// What acts on it.
     pub inputs: LinearInputs<'a>,

@@ -112,7 +112,7 @@ impl Folder {
         &self.lab
     }
 
-    /// Where it is.
+    /// The folder on disk.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -156,7 +156,7 @@ impl House {
         &self.residents
     }
 
-    /// Where it is.
+    /// The folder on disk.
     pub fn path(&self) -> &Path {
         &self.path
     }

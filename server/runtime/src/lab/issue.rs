@@ -10,7 +10,7 @@ use rcgen::{
 /// A certificate and its private key, both as PEM.
 #[derive(Debug, Clone)]
 pub struct Papers {
-    /// The certificate.
+    /// The certificate, in PEM.
     pub certificate: String,
     /// The key; only its owner may read it.
     pub key: String,

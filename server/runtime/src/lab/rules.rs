@@ -29,7 +29,7 @@ const WATCHING: [&str; 3] = ["declare_subscriber", "liveliness_query", "declare_
 /// Who may speak in one session.
 #[derive(Debug, Clone)]
 pub struct Seats {
-    /// Its keys.
+    /// The keys under which the server publishes.
     pub keys: KeySpace,
     /// Common names that may say everything: its server, and a router with rules of its own.
     pub trusted: Vec<String>,

@@ -39,7 +39,7 @@ pub struct Finding {
     pub state: State,
     /// What was looked at: `port`, `certificate`, `key`, ….
     pub about: &'static str,
-    /// What was found.
+    /// What the check saw, in words.
     pub found: String,
     /// What to do about it; empty if nothing.
     #[serde(skip_serializing_if = "String::is_empty")]

@@ -20,7 +20,7 @@ pub struct View {
     pub info: SessionInfo,
     /// The newest report.
     pub stats: Option<Stats>,
-    /// When it came.
+    /// When the newest statistics came.
     pub came: Option<Instant>,
     /// Refused messages per second, by reason, in the order of the report.
     pub refused_hz: Vec<f64>,

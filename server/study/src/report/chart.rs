@@ -24,7 +24,7 @@ pub struct Chart {
     pub x_label: String,
     /// Label of the vertical axis, with its unit.
     pub y_label: String,
-    /// The lines.
+    /// The curves, each with its name.
     pub lines: Vec<Line>,
     /// Whether the vertical axis is logarithmic at first.
     pub logarithmic: bool,

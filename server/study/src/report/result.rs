@@ -85,13 +85,13 @@ pub struct Row {
 /// A table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Title.
+    /// The line above the table.
     pub title: String,
     /// What its numbers are.
     pub about: String,
     /// Columns after the name.
     pub columns: Vec<Column>,
-    /// Rows.
+    /// One row per case, in the order of the page.
     pub rows: Vec<Row>,
 }
 
@@ -139,7 +139,7 @@ pub struct ExperimentResult {
     pub about: String,
     /// Remarks for the reader.
     pub notes: Vec<String>,
-    /// Tables.
+    /// What the page shows as tables.
     pub tables: Vec<Table>,
     /// Plots and charts.
     pub plots: Vec<Plots>,

@@ -88,7 +88,7 @@ fn yes() -> bool {
 /// Sizes of a body that determine its costs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodySize {
-    /// Elements.
+    /// Elements, or cells of an octree.
     pub elements: usize,
     /// Node copies, including those of mid-edge nodes.
     pub nodes: usize,

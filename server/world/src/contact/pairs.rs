@@ -95,7 +95,7 @@ struct Kept {
 /// Contact of two bodies in one step, or of a body with itself.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TouchReport {
-    /// The bodies.
+    /// Numbers of the two bodies.
     pub bodies: [u32; 2],
     /// Vertices that are pushed.
     pub contacts: u32,

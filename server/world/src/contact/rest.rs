@@ -40,7 +40,7 @@ struct Kept {
 pub struct Pushed {
     /// The obstacle, by its place in the scene.
     pub obstacle: u32,
-    /// Its spring.
+    /// Number of the spring that pushes.
     pub spring: u32,
     /// How far the plane of the spring is lifted [m].
     pub lift_m: f64,

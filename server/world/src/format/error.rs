@@ -96,7 +96,7 @@ pub enum MeshInError {
     Empty {
         /// File name.
         file: String,
-        /// Nodes found.
+        /// Nodes that the file has.
         n_nodes: usize,
     },
     /// Too many elements are useless.
@@ -111,7 +111,7 @@ pub enum MeshInError {
         element: &'static str,
         /// Degenerate ones.
         bad: usize,
-        /// All.
+        /// Elements that the file has.
         total: usize,
         /// The largest share accepted [%].
         limit_percent: f64,
@@ -123,7 +123,7 @@ pub enum MeshInError {
         file: String,
         /// What the file holds.
         found: &'static str,
-        /// What was wanted.
+        /// The kind of mesh that the scene asks for.
         wanted: &'static str,
         /// What to write in the scene.
         instead: &'static str,

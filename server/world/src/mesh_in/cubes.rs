@@ -36,7 +36,7 @@ pub struct OctreeReport {
     pub leaves: usize,
     /// Leaves of the finest level.
     pub finest: usize,
-    /// Vertices.
+    /// Vertices of the cells, hanging ones included.
     pub vertices: usize,
     /// Leaves of each region of another material.
     pub cells_of_region: Vec<usize>,

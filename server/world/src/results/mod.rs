@@ -54,7 +54,7 @@ pub enum ResultsError {
     Fields {
         /// File.
         path: PathBuf,
-        /// Why.
+        /// What the writer of the fields says.
         source: vtu::VtuError,
     },
 }

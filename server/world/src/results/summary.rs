@@ -88,7 +88,6 @@ pub struct Timing {
 /// Mean time of a stage or phase.
 #[derive(Debug, Clone, Serialize)]
 pub struct StageSummary {
-    /// Name.
     pub name: &'static str,
     /// Mean per step [ms].
     pub mean_ms: f64,
@@ -111,9 +110,9 @@ pub struct BodySummary {
     pub copies: usize,
     /// Parts that hang together.
     pub parts: usize,
-    /// Surface vertices.
+    /// Vertices of its surface, at the end.
     pub surface_vertices: usize,
-    /// Surface triangles.
+    /// Triangles of its surface, at the end.
     pub surface_triangles: usize,
     /// What became of its cells, where they are adapted.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -80,7 +80,7 @@ pub struct BodySpec {
     pub fixes: Vec<FixSpec>,
     /// What share of the displacements of held parts is reached when.
     pub displacement: Course,
-    /// Loads.
+    /// Forces, weights and pressures on parts of it.
     pub loads: Vec<LoadSpec>,
     /// How it is drawn.
     pub look: LookSpec,
@@ -120,7 +120,7 @@ pub struct AdaptSpec {
 /// A region of another material.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MaterialSpec {
-    /// Where.
+    /// The part of the body that has this material.
     pub place: MaterialPlace,
     /// Young's modulus [Pa].
     pub young_pa: f64,
@@ -235,7 +235,7 @@ pub enum MeshSource {
     },
     /// A shape of our own.
     Organ {
-        /// Which.
+        /// The shape, by its name.
         shape: Organ,
         /// Cells along the longest side.
         cells: usize,
@@ -277,7 +277,7 @@ pub enum CellSplit {
 /// Held nodes.
 #[derive(Debug, Clone)]
 pub struct FixSpec {
-    /// Which.
+    /// The nodes that are held.
     pub region: Region,
     /// Held directions.
     pub held: Held,
@@ -400,7 +400,7 @@ pub struct ProbeSpec {
 pub struct ObstacleSpec {
     /// Name.
     pub id: String,
-    /// What is solid.
+    /// The shape that bodies and tools cannot enter.
     pub solid: Solid,
     /// Coefficient of dry friction μ.
     pub friction: f64,

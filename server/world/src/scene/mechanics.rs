@@ -126,7 +126,7 @@ impl Mechanics {
         PcgSettings { iterations: self.iterations.unwrap_or(limit), tolerance: self.tolerance }
     }
 
-    /// The constitutive law.
+    /// The law as the physics knows it.
     pub fn constitutive_law(&self) -> Law {
         match self.law {
             RawLaw::Linear => Law::Linear,

@@ -27,11 +27,11 @@ pub enum ForceKind {
     /// A tool.
     #[default]
     Tool,
-    /// An obstacle.
+    /// A fixed obstacle of the scene.
     Obstacle,
     /// Another body.
     Body,
-    /// Itself.
+    /// Another part of the same body.
     Itself,
 }
 

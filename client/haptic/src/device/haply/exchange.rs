@@ -36,7 +36,6 @@ pub(crate) enum Lost {
     /// Nothing listens at the address, or the network is down.
     #[error("no service at {address}: {source}")]
     Unreachable {
-        /// The address.
         address: String,
         /// The error of the system.
         source: std::io::Error,

@@ -31,7 +31,7 @@ pub struct Update {
 /// A device.
 #[derive(Debug, Default, Deserialize)]
 pub struct Inverse3 {
-    /// Its id.
+    /// The name by which the service knows the device.
     pub device_id: String,
     /// Only in an inventory.
     #[serde(default)]

@@ -27,7 +27,7 @@ pub struct CellLane {
     pub octant: u8,
     /// Bit j is set if slot j hangs. Slots 0 and 7 never do.
     pub hanging: u8,
-    /// The matrix.
+    /// Where its stiffness comes from.
     pub matrix: CellMatrix,
     /// c, not negative: side · μ · s for a table of stiffness with μ = 1.
     pub factor: f32,

@@ -172,7 +172,6 @@ impl CellStiffness {
     }
 }
 
-/// No number.
 const NONE: u32 = u32::MAX;
 
 /// Rotations of some cells.

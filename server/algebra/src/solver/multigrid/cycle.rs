@@ -635,7 +635,7 @@ impl Multigrid {
         [others + self.hierarchy.memory() + self.levels.iter().map(vectors).sum::<usize>(), stored]
     }
 
-    /// The settings.
+    /// What it was made with.
     pub fn settings(&self) -> &MultigridSettings {
         &self.settings
     }

@@ -6,7 +6,6 @@ use scindo_matter::octree::{At, Cell, Octree, parent_corner};
 use scindo_matter::storage::disjoint::{find, join};
 use scindo_matter::storage::jagged::Jagged;
 
-/// No number.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// Two cells that share material across a face: the lower one, the upper one, and the axis between them.
@@ -36,9 +35,7 @@ pub(super) struct Level {
 /// A coarser level, and what it was made of.
 #[derive(Debug)]
 pub(super) struct Coarsened {
-    /// The level.
     pub level: Level,
-    /// Its links.
     pub links: Vec<Link>,
     /// The coarse cell of every fine cell.
     pub parent: Vec<u32>,

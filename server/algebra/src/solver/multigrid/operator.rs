@@ -29,7 +29,6 @@ pub(super) type CellProducts = Vec<[Padded; 8]>;
 pub(super) struct LevelOperator<'a> {
     /// The cells.
     pub level: &'a Level,
-    /// Their matrices.
     pub matrices: &'a LevelMatrices,
     /// Matrices of kinds of cells.
     pub shared: &'a [Rows],

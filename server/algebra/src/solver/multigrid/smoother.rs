@@ -105,7 +105,6 @@ pub(super) struct Smoothing<'a> {
     pub b: &'a [Padded],
     /// The solution.
     pub x: &'a mut [Padded],
-    /// The residual.
     pub r: &'a mut [Padded],
     /// The last change of the solution.
     pub d: &'a mut [Padded],

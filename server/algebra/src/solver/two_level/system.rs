@@ -20,6 +20,6 @@ pub struct CoarseSystem<'a> {
     pub diagonal: &'a [Block6],
     /// Prescribed directions.
     pub fixed: &'a [FixedCopy],
-    /// Springs.
+    /// Springs of contact at the copies.
     pub springs: &'a [Spring],
 }

@@ -17,7 +17,7 @@ use crate::cut::topology::pieces::PieceTable;
 /// The section of an incision through one fragment that it has not left yet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PendingFace {
-    /// The incision.
+    /// Number of the incision that it belongs to.
     pub incision: u32,
     /// Points where it crosses the fragment's edges and corners, in order around the section: two (a line),
     /// three or four points of the material.

@@ -49,9 +49,7 @@ struct Drawing {
 /// A line on a boundary face of a fragment.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TraceLine {
-    /// The incision.
     pub incision: u32,
-    /// The fragment.
     pub fragment: u32,
     /// Slot of its face: the one opposite this vertex.
     pub face: usize,

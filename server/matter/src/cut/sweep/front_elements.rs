@@ -68,7 +68,6 @@ pub(crate) struct FrontElements {
 /// A sweep and the body that it meets, at the positions at which the sweep began.
 #[derive(Clone, Copy)]
 pub(crate) struct Meeting<'a> {
-    /// The body.
     pub body: &'a Deformed<'a>,
     /// What the blade swept.
     pub triangles: &'a [SweepTriangle],

@@ -45,7 +45,6 @@ pub(super) struct Mosaic {
 }
 
 impl Mosaic {
-    /// The surface.
     pub(super) fn surface(&self) -> &Surface {
         &self.surface
     }

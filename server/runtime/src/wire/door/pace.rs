@@ -34,11 +34,11 @@ const CLIENTS_OF_ROUTER: f64 = 32.0;
 /// What a batch of zenoh's messages asks for.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Load {
-    /// Bytes.
+    /// Bytes of the batch.
     pub bytes: usize,
-    /// Messages.
+    /// Messages in the batch.
     pub messages: usize,
-    /// Declarations.
+    /// Declarations in the batch.
     pub declarations: usize,
     /// Names that are declared afterwards beside those before.
     pub declared: i64,

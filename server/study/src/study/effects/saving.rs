@@ -12,12 +12,12 @@ pub enum Off {
     Measured(Saving),
     /// The scene is refused without it, or it has no switch.
     Impossible {
-        /// Why.
+        /// Why the scene cannot do without the effect.
         reason: String,
     },
     /// The scene can be built without it, but its steps fail.
     Fails {
-        /// How.
+        /// What went wrong without the effect.
         reason: String,
     },
     /// The measurement was interrupted before this effect.

@@ -41,7 +41,7 @@ pub enum Mapping {
 /// An image on the skin of a body.
 #[derive(Debug)]
 pub struct Texture {
-    /// The image.
+    /// The picture as it was read.
     pub image: Image,
     mapping: Mapping,
     /// Places of vertices that were looked up, by the bits of their rest positions.
