@@ -53,6 +53,11 @@ impl<T: Copy> Jagged<T> {
         self.ranges.len()
     }
 
+    /// Whether there are no lists.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// List `i`.
     #[inline]
     pub fn get(&self, i: usize) -> &[T] {

@@ -227,7 +227,7 @@ impl Level {
 
     /// Whether the [slots](Self::slots) are listed.
     pub(super) fn has_slots(&self) -> bool {
-        self.slots.len() > 0
+        !self.slots.is_empty()
     }
 
     /// Where vertex `v` carries cells: cell and corner.
