@@ -1,6 +1,6 @@
 //! Browser viewer of scindo: serves the page in `web/` and relays the stream to it.
 //!
-//! # The way of the data
+//! # How data flows
 //! server → `scindo-client` → [`hub`] → [`outbox`] of every browser → [`socket`] → page, and back:
 //! page → [`socket`] → [`hub`] → `scindo-client` → server.
 //!

@@ -18,7 +18,7 @@
 //! * [`server`]: starts and ends all of these, and watches over them.
 //! * [`command`]: the commands and their outcome.
 //!
-//! The way of the data is wire, receive, inbox, sim, exchange, publish, wire.
+//! Data flows through wire, receive, inbox, sim, exchange, publish, wire.
 //!
 //! | thread | does | waits for |
 //! |---|---|---|

@@ -62,8 +62,9 @@ impl Model {
 
     /// Mass [kg] of every node for a density [kg/m³].
     ///
-    /// Tet4: ρ ∫ N_a dV over the pieces of the copy; Tet10: diagonal scaling (HRZ), corner m/36, edge
-    /// 4m/27, of every piece; Hex8: row sums. Exact in sum and, but for pieces of Tet10, in centre of mass.
+    /// Tet4: ρ ∫ N_a dV over the pieces of the copy, unless [`share_mass`](Self::share_mass) has changed it; Tet10:
+    /// diagonal scaling (HRZ), corner m/36, edge 4m/27, of every piece; Hex8: row sums; octree: shares of the cells.
+    /// Exact in sum and, without `share_mass` and but for pieces of Tet10, in centre of mass.
     pub fn lumped_mass(&self, density_kg_m3: f64) -> Vec<f64> {
         self.lumped.iter().map(|v| density_kg_m3 * v).collect()
     }

@@ -43,7 +43,7 @@ pub type Matrix9 = nalgebra::SMatrix<f64, 9, 9>;
 /// Isotropic elastic material of one body.
 ///
 /// ```
-/// use scindo_physics::material::{Law, Material, Rayleigh};
+/// use scindo_matter::material::{Law, Material, Rayleigh};
 ///
 /// let liver = Material {
 ///     young_pa: 1e4,
@@ -57,7 +57,7 @@ pub type Matrix9 = nalgebra::SMatrix<f64, 9, 9>;
 ///
 /// let incompressible = Material { poisson: 0.5, ..liver };
 /// assert!(incompressible.check().is_err());
-/// # Ok::<(), scindo_physics::material::MaterialError>(())
+/// # Ok::<(), scindo_matter::material::MaterialError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Material {

@@ -6,13 +6,13 @@ use super::{Lame, MaterialError, Region};
 /// region n has the constants number n − 1.
 ///
 /// ```
-/// use scindo_physics::material::{Region, Regions};
+/// use scindo_matter::material::{Region, Regions};
 ///
 /// let tumour = Region { young_pa: 5e4, poisson: 0.45, density_kg_m3: 1060.0 };
 /// let regions = Regions::new(vec![tumour], vec![0, 1, 1, 0])?;
 /// assert_eq!(regions.of(2), 1);
 /// assert_eq!(regions.counts(), [2]);
-/// # Ok::<(), scindo_physics::material::RegionsError>(())
+/// # Ok::<(), scindo_matter::material::RegionsError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Regions {

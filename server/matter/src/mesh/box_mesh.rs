@@ -35,7 +35,7 @@ const OCTAHEDRAL6: [[usize; 4]; 6] =
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use scindo_physics::mesh::{BoxPattern, box_mesh};
+/// use scindo_matter::mesh::{BoxPattern, box_mesh};
 ///
 /// let size = Vector3::new(0.3, 0.1, 0.1); // m
 /// let mesh = box_mesh(Vector3::zeros(), size, [6, 2, 2], BoxPattern::Tet6);

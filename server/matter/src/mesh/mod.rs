@@ -34,7 +34,7 @@ pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use scindo_physics::mesh::TetMesh;
+/// use scindo_matter::mesh::TetMesh;
 ///
 /// let corners = [Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()];
 /// let mesh = TetMesh { nodes: corners.to_vec(), tets: vec![[0, 1, 2, 3]] };
@@ -43,7 +43,7 @@ pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 
 ///
 /// let turned_inside_out = TetMesh { tets: vec![[1, 0, 2, 3]], ..mesh };
 /// assert!(turned_inside_out.check().is_err());
-/// # Ok::<(), scindo_physics::mesh::MeshError>(())
+/// # Ok::<(), scindo_matter::mesh::MeshError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TetMesh {

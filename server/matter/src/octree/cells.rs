@@ -61,7 +61,7 @@ impl Cell {
 
 /// Cells, links and vertices of a body.
 ///
-/// Vertices are numbered; they are the copies of [`Space`](scindo_physics::space::Space). Those of the uncut body come
+/// Vertices are numbered; they are the copies of `Space` in scindo-physics. Those of the uncut body come
 /// first.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Octree {

@@ -148,7 +148,7 @@ impl BodySettings {
 
     /// The setting that keeps a body of this law from the fast path; `None` if it can be taken.
     ///
-    /// The fast path is single precision, matrix-free, with one linear solve per step.
+    /// The fast path takes single precision and a few linear solves per step, without an assembled tangent.
     pub fn why_general(&self, law: Law) -> Option<&'static str> {
         let reasons = [
             (self.element == ElementKind::Tet10, "element tet10"),
@@ -169,7 +169,7 @@ impl BodySettings {
             (self.mass == MassKind::Consistent, "consistent mass"),
             (
                 matches!(self.mass, MassKind::Menouillard | MassKind::Floored),
-                "a mass that cut pieces share otherwise",
+                "a mass that is not lumped by the shape functions",
             ),
             (self.volumetric != Volumetric::Full, "a locking remedy"),
             (

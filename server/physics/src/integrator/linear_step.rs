@@ -645,8 +645,8 @@ impl LinearStep {
         loads.max(LEAST_REFERENCE * (2.0 * self.stored.max(0.0)).sqrt())
     }
 
-    /// Solves for δ. The reference is the residual of the first pass of the step, or that of the loads if
-    /// larger.
+    /// Solves for δ. The reference is the residual of the first pass of the step, or the least reference
+    /// if that is larger.
     fn solve(
         &mut self,
         team: &mut Team,

@@ -12,8 +12,8 @@ pub struct SolveReport {
     pub scheme: Scheme,
     /// Solver iterations, summed over all parts of the step.
     pub iterations: u32,
-    /// √(rᵀM⁻¹r) relative to the right-hand side, in the worst part of the step; that of Newton's method
-    /// if the step is nonlinear.
+    /// √(rᵀM⁻¹r) over the reference of the step, as [`is_unconverged`](Self::is_unconverged) says, in the worst part
+    /// of the step; that of Newton's method if the step is nonlinear.
     pub residual: f64,
     /// Value that `residual` has to reach; 0 if nothing is solved, as in explicit integrators.
     pub tolerance: f64,
@@ -43,8 +43,9 @@ pub struct SolveReport {
 
 impl SolveReport {
     /// Whether the body advanced by a step whose residual is above its tolerance. The residual is
-    /// √(rᵀM⁻¹r) over that of the loads: after the linear solve if a step is one by design, after Newton's
-    /// method otherwise.
+    /// √(rᵀM⁻¹r) after the linear solve if a step is one by design, after Newton's method otherwise. Its reference is
+    /// the largest of its value at the start of the step, that of the loads (1 % of it on the fast path in motion) and,
+    /// in equilibria and Newton's method, a small part of √(2Ψ).
     pub fn is_unconverged(&self) -> bool {
         self.outcome == Outcome::Advanced && self.tolerance > 0.0 && self.residual > self.tolerance
     }

@@ -29,7 +29,7 @@ pub struct StepCounts {
     pub rolled_back: u64,
     /// Steps that ended with inverted elements.
     pub inverted: u64,
-    /// Largest residual of the unconverged steps, relative to that of the loads.
+    /// Largest residual of the unconverged steps, relative to their reference.
     pub worst_residual: f64,
     /// Most parts into which a step was divided.
     pub most_parts: u32,

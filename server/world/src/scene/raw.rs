@@ -171,7 +171,8 @@ pub struct RawBody {
     /// Parameters of `integrator = "newmark"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub newmark: Option<RawNewmark>,
-    /// Mass matrix.
+    /// Mass matrix. `lumped` integrates the shape functions over each piece; with explicit integrators on tet4 it is
+    /// `menouillard`.
     #[serde(default)]
     pub mass: RawMass,
     /// Remedy for volumetric locking of nearly incompressible material. For the last percent of accuracy,

@@ -22,7 +22,7 @@ fn models(law: Law, fibres: Fibres) -> Vec<Model> {
     ];
     let hexes = box_hexes(Vector3::zeros(), SIZE, [4, 3, 3]);
     models.push(Model::hex8(&hexes, &material, Volumetric::Full).unwrap());
-    if law != Law::StVenantKirchhoff {
+    if law.splits() {
         models.push(Model::hex8(&hexes, &material, Volumetric::Selective).unwrap());
         models.push(Model::tet4(&tets, &material, Volumetric::NodeAveraged { kept: 0.05 }).unwrap());
     }

@@ -65,7 +65,7 @@ fn models() -> Vec<Model> {
         models.push(Model::tet4_cut(&cut, &material, Volumetric::Full).unwrap());
         models.push(Model::tet10(&tets, &material).unwrap());
         models.push(Model::hex8(&hexes, &material, Volumetric::Full).unwrap());
-        if law != Law::StVenantKirchhoff {
+        if law.splits() {
             models.push(Model::tet4(&tets, &material, averaged).unwrap());
             models.push(Model::tet4_cut(&cut, &material, averaged).unwrap());
             models.push(Model::hex8(&hexes, &material, Volumetric::Selective).unwrap());

@@ -15,23 +15,21 @@ pub const MAX_SEGMENTS: usize = 1024;
 ///
 /// ```
 /// # use nalgebra::Vector3;
-/// # use scindo_physics::body::{Body, BodySettings};
-/// # use scindo_physics::material::{Law, Material, Rayleigh};
-/// # use scindo_physics::mesh::{BoxPattern, box_mesh};
-/// use scindo_physics::cut::BladeSweep;
+/// # use scindo_matter::mesh::{BoxPattern, box_mesh};
+/// use scindo_matter::cut::{BladeSweep, CutMesh};
 ///
 /// # let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(0.1), [3; 3], BoxPattern::Tet6);
-/// # let (law, rayleigh) = (Law::Corotational, Rayleigh::default());
-/// # let material = Material { young_pa: 1e4, poisson: 0.4, density_kg_m3: 1e3, rayleigh, law };
-/// # let mut body = Body::new(mesh, material, BodySettings::default())?;
 /// // A cube of 0.1 m; the blade lies along y and falls through all of it.
+/// let mut cube = CutMesh::new(mesh)?;
 /// let edge = |z: f64| [Vector3::new(0.05, -0.01, z), Vector3::new(0.05, 0.11, z)];
-/// let mass = body.total_mass();
-/// let report = body.cut(&BladeSweep { segments: vec![edge(0.11), edge(-0.01)] }, 1)?;
+/// let volume = |cube: &CutMesh| cube.copy_volume().iter().sum::<f64>(); // m³
+/// let before = volume(&cube);
+/// let blade = BladeSweep { segments: vec![edge(0.11), edge(-0.01)] };
+/// let report = cube.sweep(&cube.rest_positions(), &blade, 1)?;
 /// assert!(report.elements_cut > 0 && !report.new_copies.is_empty());
-/// assert_eq!(body.components().len(), 2);
-/// assert!((body.total_mass() - mass).abs() < 1e-12); // kg
-/// # Ok::<(), scindo_physics::body::BodyError>(())
+/// assert_eq!(cube.components().len(), 2);
+/// assert!((volume(&cube) - before).abs() < 1e-15);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BladeSweep {
