@@ -115,6 +115,7 @@ impl Server {
             // Nobody else has this exchange yet.
             let _ = exchange.metrics.set(metrics.clone());
         }
+        // Readers get the newest snapshot and may miss others, so none of them holds up a step.
         let (to_publish, published) = triple_buffer(&Snapshot::default());
         let (to_contact, contact) = triple_buffer(&Snapshot::default());
         let (commands, commands_rx) = bounded::<Command>(WAITING_ORDERS);
@@ -132,6 +133,7 @@ impl Server {
                 plan,
                 rates: (config.surface_hz, config.stats_hz),
             };
+            // The publisher comes first, because events and answers of the other threads go through it.
             let publish = PublishThread::declare(&keys, &sessions, &exchange, sources, what)?;
             others.push(spawn("publish", move || publish.run())?);
             let (queries, rpc) = declare_rpc(&keys, &sessions)?;
@@ -148,12 +150,14 @@ impl Server {
             };
             others.push(spawn("rpc", move || rpc_thread.run())?);
             others.push(spawn("contact", move || contact.run())?);
+            // Input comes after all that answers, because it announces the server to clients.
             let server = Chunk::new("server id", &format!("server-{}", std::process::id()))?;
             let token = Topic::Server(server);
             let receivers = Receivers::declare(&sessions.haptic, &keys, &exchange, &token)?;
             let foreign = refuse_foreign(&keys, &sessions)?;
             network = Some(Network { _receivers: receivers, _rpc: rpc, _foreign: foreign, sessions });
         }
+        // The threads above have taken what they need from the engine; now it moves to its own.
         let sim =
             SimThread::new(engine, exchange.clone(), commands_rx, (to_publish, to_contact), config.pace);
         let sim = spawn("sim", move || sim.run())?;

@@ -128,6 +128,7 @@ impl Chunk {
         let amended: Vec<(u32, usize, usize)> =
             self.lanes().filter(|&(p, ..)| is_amended[p as usize]).collect();
         let known = self.copies.len();
+        // All chunks share the numbering, so it first has to learn the list of this one.
         numbering.note(&self.copies, 0);
         // Copies that are new to the chunk, and their nodes.
         let mut new: Vec<(u32, u32)> = Vec::new();
@@ -149,6 +150,7 @@ impl Chunk {
         self.copies.extend(new.iter().map(|n| n.0));
         self.rest.extend(new.iter().map(|n| mesh.nodes[n.1 as usize]));
         debug_assert!(self.copies.is_sorted());
+        // Sorting has moved the new copies from the places that were noted for them.
         numbering.note(&self.copies, known);
         let n = n_copies + 1;
         let copies = &self.copies;
@@ -159,12 +161,14 @@ impl Chunk {
         let held: Vec<[u16; 4]> = added.iter().map(|new| locals(new.piece)).collect();
         let places = free_lanes(&mut self.pieces, added, &held, n);
         self.batches.grow(self.pieces.len(), n);
+        // An assembled stiffness is not made anew for these lanes: it takes them in when it is assembled next.
         for (p, batch, lane) in amended {
             let (ids, corners) = (locals(p), corners_of(&self.corners, batch, lane));
             self.batches.set_nodes(batch, lane, corners.map(|c| ids[c as usize]));
             self.batches.rest_mut(batch).set_volume(lane, mesh, &merged[p as usize]);
             self.unassembled.push([batch, lane]);
         }
+        // Batches of strips are full, so the corners of new lanes have the order of the mesh.
         for (([batch, lane], ids), NewLane { piece, rotation }) in places.into_iter().zip(held).zip(added) {
             self.batches.set_nodes(batch, lane, ids);
             self.batches.rest_mut(batch).set(

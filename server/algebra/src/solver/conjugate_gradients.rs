@@ -130,6 +130,7 @@ where
             }
             let alpha = size.rho / curvature;
             let mut next = self.advance(team, system, x, (alpha, scale));
+            // A step lowers the square of the error in the energy norm by α ρ; `scale` restores the unit.
             error.add(alpha * size.rho * scale * scale);
             report.iterations += 1;
             let norm = next.norm * scale;
@@ -151,6 +152,7 @@ where
                     return report;
                 }
                 checked = known;
+                // Only the residual is replaced; the direction stays, so that convergence does not begin from scratch.
                 next = self.restart(team, system, scale);
             }
             beta = next.rho / size.rho;

@@ -218,6 +218,7 @@ impl Newton {
         let mut report = NewtonReport { potential: potential_there, ..NewtonReport::default() };
         let mut first = None;
         let mut curvature = self.settings.curvature;
+        // Full steps with extrapolated stress go first, where there are such; what they leave is minimised as usual.
         if self.mixed_steps(team, potential, (x, fixed), (&mut report, &mut first)) {
             return report;
         }
@@ -297,8 +298,10 @@ impl Newton {
             largest = largest.max(phi.abs());
             x.copy_from_slice(&self.trial);
             std::mem::swap(&mut self.g, &mut self.trial_g);
+            // A potential that stands in for another one changes with the iterate, and Φ and its gradient with it.
             phi += potential.renew(x, &mut self.g);
             report.steps += 1;
+            // The projection was for this step only; the next one tries the Hessian that was asked for.
             curvature = self.settings.curvature;
             let full = report.backtracks == backtracks && report.gradient_steps == gradient_steps;
             full_step_from = full.then_some(before);

@@ -90,6 +90,7 @@ impl Pcg {
         x: &mut [Padded],
         (reference, settings): (f64, PcgSettings),
     ) -> LinearReport {
+        // The last run spared itself M⁻¹ at its end; whoever goes on needs it.
         if std::mem::take(&mut self.owed) {
             let next = M.apply(team, A, &self.r, &mut self.z, &mut self.partial);
             (self.rz, self.beta) = (next, next / self.rz);
@@ -122,6 +123,7 @@ impl Pcg {
                 report.stop = StopReason::NonFinite;
                 return report;
             }
+            // Along p there is no minimum: `x` stays where the step before led.
             if curvature <= 0.0 {
                 report.stop = StopReason::NonPositiveCurvature;
                 return report;
@@ -130,6 +132,7 @@ impl Pcg {
             error.add(alpha * rz);
             report.algebraic_error = error.norm();
             report.iterations += 1;
+            // With a fixed number of iterations nobody asks for the last residual, so the products in M⁻¹ are put off.
             if settings.tolerance == 0.0 && report.iterations == settings.iterations && M.uses_operator() {
                 let Self { r, z, p, q, partial, .. } = self;
                 Iterate { x, r, z, partial }.along(team, alpha as f32, [p, q]);

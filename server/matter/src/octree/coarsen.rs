@@ -232,6 +232,7 @@ impl Octree {
             }
         }
         let Joining { mut told, absorbed, earlier, mut vanished, joined } = joining;
+        // Corners are resolved by old numbers, while absorbed cells are still in their places.
         for id in 0..told.len() {
             told[id] &= !absorbed[id];
             if told[id] && self.hanging[id] != 0 {
@@ -251,6 +252,7 @@ impl Octree {
             })
             .collect();
 
+        // From here on numbers close up; all that needs the old ones has been computed.
         let mut gone = vec![false; vertices_before];
         vanished.iter().for_each(|(vertex, ..)| gone[*vertex as usize] = true);
         let (cell_of, vertex_of) = (numbers_of(&absorbed), numbers_of(&gone));
@@ -258,6 +260,7 @@ impl Octree {
         let mut new = 0;
         for id in (0..absorbed.len()).filter(|&id| !absorbed[id]) {
             let cell = self.cells[id];
+            // Cells only move down, over absorbed ones, so nothing is overwritten before it is read.
             if new != id {
                 self.cells[new] = cell;
                 self.vertices[new] = self.vertices[id];

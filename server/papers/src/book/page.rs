@@ -177,6 +177,7 @@ pub(super) fn index(
             let _ = write!(out, "<td class=\"number\">{count}</td>");
         });
         out += "<td><div class=\"tally\">";
+        // The bar shows shares, so that papers with few and with many numbers compare.
         for (i, count) in tally.counts.iter().enumerate() {
             let _ = write!(
                 out,
@@ -191,13 +192,16 @@ pub(super) fn index(
             value, with the reason, and neither is better. Not yet: no measurement.</p>\n";
     out += "<h2>Studies</h2>\n<div class=\"scroll\"><table>\n<thead><tr><th>study</th><th>result</th>\
             <th class=\"number\">took</th><th>report</th></tr></thead>\n<tbody>\n";
+    // Parts that were not run are listed, too: the book tells what is missing.
     for part in parts {
         let made = measured.report(&part.name);
+        // Effects of all scenes share a page, on which each has its place.
         let title = match (made, part.has_page()) {
             (Some(_), true) => format!("<a href=\"{}/index.html\">{}</a>", part.name, prose(&part.title)),
             (Some(_), false) => format!("<a href=\"effects.html#{}\">{}</a>", part.name, prose(&part.title)),
             (None, _) => prose(&part.title),
         };
+        // Relative to the index, so that the book can be moved as a whole.
         let report = part.report(std::path::Path::new("")).display().to_string();
         let link = made.map_or(String::new(), |_| format!("<a href=\"{report}\">JSON</a>"));
         let took = match measured.seconds(&part.name) {

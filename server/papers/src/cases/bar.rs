@@ -77,6 +77,7 @@ pub(super) fn in_motion(quick: bool) -> Case {
     let integrators = ["implicit-euler", "bdf2", "newmark", "symplectic-euler", "midpoint", "rk4"];
     let mesh = cells("bar", meshes, base);
     let mut axes = axes(&body, "corotational", elements(&body, Some("tet5"), "tet4"), mesh, 1e-4);
+    // Beside tolerances a fixed number of iterations, as a simulation in real time has it.
     if let Some(axis) = axes.iter_mut().find(|axis| axis.factor == Factor::Tolerance) {
         axis.settings.push(iterations(&body, 10));
     }
@@ -104,6 +105,7 @@ pub(super) fn in_motion(quick: bool) -> Case {
         fewest_frames: 0,
         notes: Vec::new(),
         goal: Goal::new("lowest point of the tip", gold.probe("tip_center"), [0.0, -1.0, 0.0]),
+        // No solution of the motion is stored; its limit is extrapolated from the bar's own runs.
         truth: Truth::Extrapolated { law: "corotational".into(), plans: plans(&body, &axes, quick) },
         blocks: vec![
             Block(vec![(Factor::Mesh, meshes.clone()), (Factor::Step, hs.clone())]),
@@ -117,6 +119,7 @@ pub(super) fn in_motion(quick: bool) -> Case {
                 (Factor::Element, names(&["tet4", "hex8"])),
                 (Factor::Step, hs.clone()),
             ]),
+            // Explicit steps are short and many, so these integrators run on the coarsest mesh only.
             Block(vec![
                 (Factor::Integrator, names(&integrators[3..])),
                 (Factor::Mesh, meshes.iter().take(1).cloned().collect()),

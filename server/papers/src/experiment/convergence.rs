@@ -51,6 +51,7 @@ pub(super) fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentR
     let (across, levels) = if bench.is_quick() { (32, 3) } else { (CUBE, 4) };
     let grids = [Grid::Uncut, Grid::Aligned, Grid::Rotated];
     let total = 2 * grids.len() + MASSES.len() + 1;
+    // Mass makes a system easier for cycles, so every grid is solved with and without it.
     for (problem, caption) in
         [(Problem::Step(S_CUBE), "with the mass of table 2"), (Problem::Equilibrium, "without mass")]
     {
@@ -59,6 +60,7 @@ pub(super) fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentR
             bench.begin(format!("cube, {}, {caption}", grid.name()), total)?;
             let model = cube(across, levels, grid)?;
             let (cells, found) = of(&model, problem, grid.name(), &mut charts)?;
+            // The rates of the paper are those with mass.
             let printed = Some(printed).filter(|_| problem != Problem::Equilibrium);
             rates.row(format!("{}, {}", model.name, problem.words()), &row(cells, &found, printed));
         }
@@ -70,6 +72,7 @@ pub(super) fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentR
             ..Plots::default()
         });
     }
+    // One cut body from no mass to more and more of it, so that the rate changes by nothing else.
     let model = if bench.is_quick() {
         animal(None, 39, 2, Cuts::Curved)?
     } else {

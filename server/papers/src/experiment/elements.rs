@@ -110,6 +110,7 @@ pub(super) fn elements(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResu
     for (name, cut) in [("whole", ""), ("cut", CUT)] {
         let scene = Scene::from_toml(&format!("{SCENE}{cut}"))?;
         let runs = runs(bench, &scene, !cut.is_empty(), name)?;
+        // Nothing is known of the exact solution, so the limit of uniform cells stands for it, uncut and cut.
         let done: Vec<&Run> = runs[LIMIT].iter().filter(|run| run.1.is_done()).collect();
         let [.., first, second, third] = &done[..] else {
             return Err("fewer than three runs of uniform cells".into());
@@ -120,6 +121,7 @@ pub(super) fn elements(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResu
         let error = |trial: &Trial| trial.series.minus(&limit.value).norm() / limit.value.norm();
         let courses: Vec<Vec<[f64; 2]>> = runs.iter().map(|runs| course(runs, &error)).collect();
         plots.plots.push(plot(name, &runs, &error, limit.error_bar));
+        // All kinds are asked for their time at one error, that of uniform cells of this size.
         let at = if bench.is_quick() { 16 } else { 32 };
         let goal = runs[LIMIT].iter().find(|run| run.0 == at).ok_or("no such run")?;
         let goal = (error(&goal.1), 1e-3 * goal.1.cost.median_ms);
@@ -129,6 +131,7 @@ pub(super) fn elements(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResu
                 [Some(goal.0), Some(limit.error_bar), seconds, seconds.map(|seconds| seconds / goal.1)];
             table.row(format!("{name}, {}", kind.name), &values);
         }
+        // Uniform and adaptive cells run at the same sizes; their difference is what larger cells inside cost.
         for ((across, own), (_, other)) in runs[LIMIT].iter().zip(&runs[LIMIT + 1]) {
             let apart = own.series.minus(&other.series).norm() / limit.value.norm();
             let values = [own.elements as f64, other.elements as f64, error(own), error(other), apart];

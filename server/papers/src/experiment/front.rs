@@ -109,6 +109,7 @@ pub(super) fn front(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
         for law in LAWS {
             let name = format!("{pull_name}, {law}");
             bench.begin(format!("{name}, pre-cut"), total)?;
+            // A mesh with faces at the true front knows no place in an element, so one run serves all of them.
             let precut = error(bench, pull, law, None)?;
             let mut lines =
                 WAYS.map(|way| Line { name: format!("{law}, {}", way.name()), points: Vec::new() });
@@ -116,11 +117,13 @@ pub(super) fn front(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
             for place in PLACES {
                 let mut errors = [None; WAYS.len()];
                 for (k, way) in WAYS.into_iter().enumerate() {
+                    // An advancing blade costs an equilibrium per step, so a quick study spares most of its places.
                     if way == Way::Advancing && !advancing.contains(&place) {
                         continue;
                     }
                     let what = format!("{name}, front at {place}, {}", way.name());
                     bench.begin(what.clone(), total)?;
+                    // A run without a result leaves a note and a gap; only the end of the study ends the experiment.
                     match error(bench, pull, law, Some((way, place)))? {
                         Ok(found) => {
                             errors[k] = Some(found);
@@ -139,6 +142,7 @@ pub(super) fn front(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
             let [calibrated, advancing] =
                 ratios.map(|all| (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64));
             table.row(format!("{pull_name}, {law}, mean"), &[None, None, None, None, calibrated, advancing]);
+            // The same error at all places: a level line for the others to be held against.
             match precut {
                 Ok(error) => {
                     let points = [PLACES[0], PLACES[PLACES.len() - 1]].map(|place| [place, error]).to_vec();

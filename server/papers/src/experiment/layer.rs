@@ -64,6 +64,7 @@ pub(super) fn layer(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
         ],
     );
     let (across, levels) = if bench.is_quick() { (SMALL, 3) } else { (CUBE, 4) };
+    // One run without the layer and one without the cut tell what each contributes.
     for (name, cut, soft) in
         [("layer, cut", true, true), ("no layer, cut", true, false), ("layer, uncut", false, true)]
     {
@@ -83,9 +84,11 @@ pub(super) fn layer(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
             ],
         );
     }
+    // The paper prints the sum of cutting and step only.
     let [before, after] = LAYERED.map(Some);
     table.printed("figure 14", &[before, after, None, None, Some(LAYERED_S), None, None, None]);
     bench.begin("picture", 4)?;
+    // The picture is of a cube with few cells, whose surface a page can carry.
     let small = run(SMALL, 3, true, true)?;
     result.pictures.push(view::surface(
         small.body.surface(),

@@ -56,6 +56,7 @@ pub(super) fn levels(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult
         ],
     );
     for grid in [Grid::Uncut, Grid::Rotated] {
+        // Level 0 comes first: all others are measured against it.
         let mut finest: Option<Run> = None;
         for level in 0..=BodySettings::COARSEST_SIMULATED {
             bench.begin(format!("{}, level {level}", grid.name()), 6)?;
@@ -75,6 +76,7 @@ pub(super) fn levels(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult
                     Some(errors[1]),
                 ],
             );
+            // Rods show what composite elements make of a body; the uncut block hardly does.
             if grid == Grid::Rotated {
                 result.pictures.push(view::surface(
                     run.body.surface(),
@@ -83,6 +85,7 @@ pub(super) fn levels(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult
                     format!("Level {level}"),
                 ));
             }
+            // Only the first body of a grid is kept, so no more than two are in memory.
             finest.get_or_insert(run);
         }
     }

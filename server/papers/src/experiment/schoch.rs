@@ -130,6 +130,7 @@ pub(super) fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult
         for law in LAWS {
             let name = format!("{case} {law}");
             let mut runs = Vec::new();
+            // All ways run before any error is known: where no solution is stored, their own runs give the reference.
             for (way, meshes) in METHODS.iter().zip(&of_ways) {
                 let mut of_way = Vec::new();
                 for &mesh in meshes {
@@ -143,11 +144,13 @@ pub(super) fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult
                 }
                 runs.push(of_way);
             }
+            // Entry 1 is that of pre-cut meshes of linear elements.
             let Some((truth, error_bar)) = reference(pull, law, &runs[1]) else {
                 result.notes.push(format!("{name}: no reference, because pre-cut meshes have no limit"));
                 continue;
             };
             let courses: Vec<Vec<Point>> = runs.iter().map(|runs| course(runs, &truth)).collect();
+            // A single point is no line, but it has its place in the table.
             for (way, course) in METHODS.iter().zip(&courses).filter(|(_, course)| course.len() > 1) {
                 let points = course.iter().map(|point| [point.unknowns.log10(), point.error]).collect();
                 chart.lines.push(Line { name: format!("{law}, {}", way.name), points });
@@ -157,6 +160,7 @@ pub(super) fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult
                 let (xfem, precut) = (&pair[0], &pair[1]);
                 let [of_xfem, of_precut] = [slope(xfem), slope(precut)];
                 let both = |mesh: usize| Some((at(xfem, mesh)?.error, at(precut, mesh)?.error));
+                // Only errors on the same mesh have a meaningful ratio.
                 let finest = (0..MESHES.len()).rev().find_map(both);
                 let [xfem_error, precut_error] = [finest.map(|both| both.0), finest.map(|both| both.1)];
                 let ratio = finest.map(|(xfem, precut)| xfem / precut);

@@ -59,6 +59,7 @@ pub(super) fn sizes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
             ("stored matrices", Unit::Number),
         ],
     );
+    // The largest bodies take most of the time, so a quick study goes without them.
     let sizes = |all: &'static [(u32, u8); 4]| if bench.is_quick() { &all[..3] } else { &all[..] };
     let (cubes, bodies) = (sizes(&SIZES), sizes(&ANIMALS));
     let runs = cubes.len() + bodies.len();
@@ -67,6 +68,7 @@ pub(super) fn sizes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
         bench.begin(format!("cube, {across} cells across"), runs)?;
         let own = step(&cube(across, levels, Grid::Rotated)?)?;
         memory.row(format!("cube, {label}"), &own.memory());
+        // Beyond that size a uniform grid has too many cells to be worth the wait; its columns stay empty.
         let uniform = if across <= UNIFORM { Some(step(&cube(across, 0, Grid::Rotated)?)?) } else { None };
         let beside = [
             uniform.as_ref().map(|u| u.cells),
@@ -75,6 +77,7 @@ pub(super) fn sizes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
         ];
         table.row(label, &[own.times().as_slice(), &beside].concat());
     }
+    // Rods of a coarse cube are few cells wide, while the animal is the same body at every size.
     for &(across, levels) in bodies {
         let label = format!("{across} across, {levels} levels");
         bench.begin(format!("animal, {across} cells across"), runs)?;

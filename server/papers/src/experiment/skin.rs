@@ -62,6 +62,7 @@ pub(super) fn skin(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, 
             bench.begin(format!("{}, {across} across", organ.name()), ORGANS.len() * cells.len())?;
             let (of_cells, h) = filled(&solid, across)?;
             let apart = of_cells.apart(&own)?;
+            // In sides of a cell, so that all sizes compare.
             table.row(
                 format!("{}, {across} across", organ.name()),
                 &[
@@ -75,6 +76,7 @@ pub(super) fn skin(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, 
                 ]
                 .map(Some),
             );
+            // Numbers do not tell whether a fold has gone, so both surfaces are also shown.
             if across == SHOWN {
                 for (surface, words) in [(&of_cells, "the surface of its cells"), (&own, "its own surface")] {
                     let caption = format!("{}, {across} cells across: {words}", organ.name());

@@ -117,6 +117,7 @@ pub(super) fn slits(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
         ..ExperimentResult::default()
     };
     let total = WAYS.len() * SLITS.len() + SLITS.len();
+    // The truth comes first, because all ways are measured against it. One fine beam takes all slits in turn.
     let mut truth = Vec::new();
     let mut fine = fine_beam()?;
     let mut made = 0;
@@ -132,6 +133,7 @@ pub(super) fn slits(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
             100.0 * eta
         ));
     }
+    // The fine beam is large and no longer needed.
     drop(fine);
     let mut table = Table::new(
         "After 1, 10 and 100 slits",
@@ -157,6 +159,7 @@ pub(super) fn slits(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
     let mut counts: Vec<(Way, usize)> = Vec::new();
     for (way, name) in WAYS {
         let mut body = beam(way)?;
+        // Removal takes mass away, so what is left is weighed against the uncut beam.
         let whole: f64 = body.masses().iter().sum();
         let (mut made, mut cut_s) = (0, 0.0);
         let (mut errors, mut critical) = (Vec::new(), Vec::new());
@@ -165,6 +168,7 @@ pub(super) fn slits(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
             let begun = Instant::now();
             cut_until(&mut body, &mut made, slits)?;
             cut_s += begun.elapsed().as_secs_f64();
+            // The time per cut is the mean over all slits so far.
             let found = measure(&mut body, whole, cut_s / slits as f64)?;
             if let Err(reason) = &found.sag {
                 result.notes.push(format!("{name}, {slits} slits: no equilibrium, because {reason}"));
@@ -184,6 +188,7 @@ pub(super) fn slits(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult,
                 found.step_s,
             ];
             let values: Vec<Option<f64>> = values.map(Some).into_iter().chain([error]).collect();
+            // Removal tells how many elements the slits touch, remeshing what it makes of them: compared at the end.
             counts.push((way, found.elements));
             let word = if slits == 1 { "slit" } else { "slits" };
             table.row(format!("{name}, {slits} {word}"), &values);

@@ -95,6 +95,7 @@ fn of(
     let cells = cut.space.octree().cells().len();
     let mut system = System::new(cut.space.octree(), (model.held, model.pull), problem)?;
     let (exact, left) = system.converged();
+    // An error of the solution would pass for an error of every solver.
     if left.is_nan() || left > CONVERGED {
         return Ok(Err(left));
     }
@@ -141,9 +142,11 @@ fn of(
             ],
         );
     };
+    // Factors fill in, so a direct solver is out of the question for larger bodies.
     if cells <= direct {
         let (u, seconds) = cholesky(&system)?;
         let off: f64 = u.iter().zip(&exact).map(|(u, e)| (u - e).norm_squared()).sum();
+        // A factorisation has no error to show before its end, so its curve is a single point.
         let points = vec![(seconds, off.sqrt() / norm(&exact))];
         add(0, None, &Course { begin_s: 0.0, points });
     }
@@ -153,7 +156,9 @@ fn of(
         let begin_s = seconds.levels + seconds.coarse;
         let course = run(&mut system, Solver::Cycles(&mut multigrid), &exact, until(PATIENCE[1 + i]));
         add(2 + i, Some(seconds.levels), &Course { begin_s, ..course });
+        // The same levels in conjugate gradients; they had to be made for either, so both times include them.
         let course = run(&mut system, Solver::Preconditioned(&mut multigrid), &exact, until(PATIENCE[1 + i]));
+        // The names of these two stand in the opposite order.
         add(5 - i, Some(seconds.levels), &Course { begin_s, ..course });
     }
     Ok(Ok(plot))

@@ -80,7 +80,9 @@ pub(super) fn springs(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResul
     let total = POISSON.len() * (1 + 3 * meshes.len());
     for poisson in POISSON {
         bench.begin(format!("truth, ν = {poisson}"), total)?;
+        // Springs know no ν: the same networks are held against another truth for each of them.
         let truth = Answer::of_body(|| beam(TRUTH_ACROSS, poisson, ElementKind::Tet10))?;
+        // Calibrated on one mesh and for one load; the other rows show how far that carries.
         let factor = calibration(&truth)?;
         let mut table = Table::new(
             &format!("ν = {poisson}"),
@@ -105,6 +107,7 @@ pub(super) fn springs(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResul
             let mut points = Vec::new();
             for &across in meshes {
                 bench.begin(format!("{name}, {across} cells across, ν = {poisson}"), total)?;
+                // The answer is an equilibrium, while the time is that of one step, made by a body of its own.
                 let answer = way.answer(across, poisson)?;
                 let seconds = way.time(across, poisson)?;
                 let errors = answer.errors(&truth);
@@ -115,6 +118,7 @@ pub(super) fn springs(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResul
             }
             chart.lines.push(Line { name: name.into(), points });
         }
+        // Narrowing belongs to the material and not to the mesh, so the truth has it, too.
         table.row("truth", &[None, None, None, Some(truth.narrowing()), None]);
         result.tables.push(table);
         let caption = format!(

@@ -196,9 +196,11 @@ fn measure(entry: &Entry, tables: &mut Tables) -> Result<(), Trouble> {
     let mut system = System::new(cut.space.octree(), (adaptive.held, adaptive.pull), Problem::Step(*s))?;
     let operator_s = system.update();
     let (exact, left) = system.converged();
+    // A solution that is not converged would pass for an error of the solvers.
     if left.is_nan() || left > 1e-7 {
         return Err(format!("{}: the solution is not converged", adaptive.name).into());
     }
+    // The uniform grid is cut alike, so that its step differs by the cells alone.
     let mut of_uniform = match uniform {
         Some(model) => {
             let cut = model.cut()?;
@@ -218,9 +220,11 @@ fn measure(entry: &Entry, tables: &mut Tables) -> Result<(), Trouble> {
     for (name, smoother, in_gradients) in ways {
         let (mut multigrid, seconds) = system.multigrid(smoother);
         let course = three_cycles(&mut system, &mut multigrid, in_gradients, &exact);
+        // The levels of the uniform grid follow, and both together may be too much memory.
         drop(multigrid);
         let uniform_s = of_uniform.as_mut().map(|system| step_of_three(system, smoother, in_gradients).0);
         let multigrid_s = seconds.coarse + course.points.last().map_or(f64::NAN, |point| point.0);
+        // One run of conjugate gradients serves all ways: down to the least error, and for the longest time.
         until.error = until.error.min(course.error(3));
         until.seconds = until.seconds.max(multigrid_s);
         runs.push((name, seconds, course, multigrid_s, uniform_s));

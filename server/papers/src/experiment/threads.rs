@@ -134,6 +134,7 @@ pub(super) fn threads(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResul
     let mut charts = [Chart::new("Run time of 5 s", "threads", "s"), Chart::new("Speed-up", "threads", "")];
     charts[0].logarithmic = true;
     let ends = [counts[0], *counts.last().unwrap_or(&1)].map(|n| n as f64);
+    // Runs below this line are faster than real time.
     charts[0].lines.push(Line { name: "real time".into(), points: ends.map(|n| [n, SIMULATED_S]).into() });
     for model in [&HIPPO, &BAR] {
         let mut courses = Vec::new();
@@ -141,8 +142,11 @@ pub(super) fn threads(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResul
             bench.begin(format!("{} on {n} threads", model.name), total)?;
             courses.push((n, model.course(model.cells, n)?));
         }
+        // The first run is on one thread, the measure of profile and speed-up.
         let (_, alone) = &courses[0];
+        // A speed-up of a computation that comes out differently would mean nothing.
         model.check(&courses)?;
+        // Phases do not tell products from the rest of a solve, so a product is timed alone.
         let product_s = model.product_s()? * f64::from(alone.iterations);
         let rest = alone.seconds - alone.forces_s - alone.solve_s;
         let [blocks, stored] = model.blocks();

@@ -338,7 +338,9 @@ impl BodySettings {
         if self.newton_steps.is_some_and(|steps| !(1..=10_000).contains(&steps)) {
             return setting("solver.newton_steps", self.newton_steps.map_or(0.0, f64::from), "1 … 10 000");
         }
+        // Next come combinations that do not go together, whatever their values.
         let refused = |what, with, instead| Err(BodyError::Combination { what, with, instead });
+        // Meshes of linear tetrahedra are the only ones that a cut can change.
         let changes = self.cutting.mesh_cut().is_some();
         match (self.cutting, self.element, self.loose) {
             (_, ElementKind::Tet10, _) if changes => {
@@ -381,6 +383,7 @@ impl BodySettings {
                 return refused("viscoelasticity", with, instead);
             }
         }
+        // Last, because nearly every setting decides whether a body can do with single precision.
         match (self.arithmetic, self.why_general(law)) {
             (Some(Arithmetic::Single), Some(with)) => {
                 Err(BodyError::Combination { what: "single precision", with, instead: "mixed or double" })

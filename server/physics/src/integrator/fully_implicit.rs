@@ -168,6 +168,7 @@ impl ModelSolver {
             prescribe(inputs.fixed, x);
             phi.pressure.1.begin(inputs.pressure, x);
         }
+        // Relaxation spreads an equilibrium over many steps, in each of which a few iterations are made.
         if let (Scheme::Static, Some(iterations)) = (self.settings.scheme, self.settings.relaxation) {
             self.relaxation.tolerance = settings.tolerance;
             if !self.active.springs.is_empty() {
@@ -197,9 +198,11 @@ impl ModelSolver {
         if done.stop != StopReason::NonFinite && loose {
             self.balance_parts(x, (inputs, history));
         }
+        // Where few solves are the step by design, the last of them tells whether it has converged.
         if linearised {
             done = judged_by_its_solve(done, settings.tolerance);
         }
+        // A repeated step may aim at a finer tolerance than was asked for, which it need not reach.
         let reached = done.residual <= self.settings.newton.tolerance;
         if self.careful && done.stop == StopReason::IterationLimit && reached {
             done.stop = StopReason::Converged;

@@ -225,6 +225,7 @@ impl LinearStep {
         inputs: &LinearInputs<'_>,
         spring_forces: &mut [Vector3<f64>],
     ) -> StepOutcome {
+        // Nothing has changed since the last step: its search goes on with the operator that is there.
         if self.searches(inputs) && self.goes_on(elastic, state, inputs) {
             return self.relax(team, elastic, state, inputs, spring_forces);
         }
@@ -233,6 +234,7 @@ impl LinearStep {
         if self.lagged {
             self.springs.springs.iter_mut().for_each(ActiveSpring::lag);
         }
+        // The line search compares potentials, so springs need the forces of the potential at the predictor.
         if inputs.descends() {
             self.choose_modes(inputs);
         }
@@ -242,6 +244,7 @@ impl LinearStep {
         self.descent.begin();
         for number in 0..inputs.solves.max(1) {
             let inverted = self.update_operator(team, elastic, state, inputs);
+            // Counted where the step begins, not on the way to an equilibrium.
             if number == 0 {
                 inverted_pieces = inverted;
             }
@@ -271,6 +274,7 @@ impl LinearStep {
             }
             began = self.began;
         }
+        // Otherwise the state stays as it was before the step.
         if finite {
             self.commit(team, state, inputs, spring_forces);
         }
@@ -574,6 +578,7 @@ impl LinearStep {
         }
         let (f_int, damping, solved, predicted) =
             (&self.f_int, &self.damping, &self.scratch, &self.predicted);
+        // In an equilibrium the forces cancel each other, and single precision would leave mostly rounding.
         let exact = (!inputs.moves()).then_some(&self.exact);
         let (M, shift) = (&self.preconditioner, &self.translations.shift);
         let results = (blocks(&mut self.pcg.r, BLOCK), blocks(&mut self.partial, 1));
@@ -586,6 +591,7 @@ impl LinearStep {
                 if damped {
                     f -= unpadded(&damping[c]);
                 }
+                // Moving a free part as a whole strains nothing, so only its mass counts.
                 let moved = shift[inputs.step.parts.of_copy[c] as usize];
                 *r = padded(&(s * f - factor * inputs.step.mass[c] * moved - inputs.inertia(c, predicted)));
                 if pass > 0 {
@@ -633,6 +639,7 @@ impl LinearStep {
                 (0..3).for_each(|k| r[k] += (w * f[k]) as f32);
             }
         }
+        // Last, because springs pull at held copies, too.
         filter(inputs.step.fixed, &mut self.pcg.r);
     }
 

@@ -90,6 +90,7 @@ pub enum Notice {
 
 impl fmt::Display for Notice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Each says what happened first, then what was done instead or what would help.
         match self {
             Self::BadInput => write!(f, "the step length, gravity, loads or parameters are not valid"),
             Self::TooLong { h_s, stable_s, needed } => write!(
@@ -123,12 +124,14 @@ impl fmt::Display for Notice {
             Self::Recovery => write!(f, "inverted or collapsed elements: more Newton steps allowed"),
             Self::LooseBody => write!(f, "nothing holds a part of the body: no static equilibrium"),
             Self::Underheld { motion, driven } => {
+                // The mass tells which part is meant: a crumb of a cut, or most of the body.
                 let (mass_kg, FreeMotion { slide, turn, about, .. }) = (motion.mass_kg, motion);
                 write!(f, "nothing keeps a part of {mass_kg:.3e} kg from ")?;
                 match motion.is_translation() {
                     true => write!(f, "sliding along {}", rounded(slide))?,
                     false => write!(f, "turning about {} through {} m", rounded(turn), rounded(about))?,
                 }
+                // A motion that no load drives leaves an equilibrium, one of many.
                 match driven {
                     true => write!(
                         f,

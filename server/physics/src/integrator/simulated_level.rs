@@ -206,6 +206,7 @@ impl SimulatedLevel {
                     }
                 }
             });
+            // This gives the norm in which the reference is, and the next inner solve begins from it.
             let rz = self.precondition(team);
             let norm = rz.max(0.0).sqrt();
             report.residual = if reference > 0.0 { norm / reference } else { norm };
@@ -224,6 +225,7 @@ impl SimulatedLevel {
                 StopReason::Stagnated
             } else {
                 before = norm;
+                // The limit is that of all inner solves together.
                 let left = PcgSettings { iterations: settings.iterations - report.iterations, ..settings };
                 let inner = self.solve_approximately(team, norm, (reference, left, method));
                 report.iterations += inner.iterations;

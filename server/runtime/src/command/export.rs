@@ -28,6 +28,7 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode, RuntimeError> {
             next: "Leave it out for 0.1".to_owned(),
         });
     }
+    // Read once for its length: key frames are spread over all of it, and the last step is always a frame.
     let steps = count(&args.file)?;
     let mut replay = Replay::open(&args.file, usize::from(args.threads), None)?;
     let step_s = replay.simulation().step_s();
@@ -35,12 +36,14 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode, RuntimeError> {
     let mut gltf = args.gltf.as_ref().map(|_| Gltf::new());
     let mut forces = args.csv.as_deref().map(Forces::begin).transpose()?;
     let every = ((args.every / step_s).round() as u64).max(1);
+    // One less than a file may hold, because the last step is a frame in any case.
     let key = steps.div_ceil(MAX_FRAMES as u64 - 1).max(1);
     let progress = Progress::begin("steps", Some(steps), args.json);
     let mut next = Some(0);
     while let Some(number) = next {
         let is_last = number == steps;
         if let Some(series) = series.as_mut().filter(|_| number.is_multiple_of(every) || is_last) {
+            // Not by the time of the simulation, which a reset sets back.
             series.add(number as f64 * step_s, replay.simulation())?;
         }
         if let Some(gltf) = gltf.as_mut().filter(|_| number.is_multiple_of(key) || is_last) {
@@ -72,6 +75,7 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode, RuntimeError> {
         say!("{report}");
         return Ok(ExitCode::SUCCESS);
     }
+    // The states are what this build makes of the inputs, so the export stands and says so.
     if let Some(first) = &replay.found().first_difference {
         tracing::warn!("from step {} on, the states are not those that were recorded", first.number);
     }

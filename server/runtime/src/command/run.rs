@@ -99,6 +99,7 @@ fn serve(
 ) -> Result<ExitCode, RuntimeError> {
     let keys = KeySpace::new(&args.realm, &args.session)?;
     let pace = pace(args, scene.checked().step_s)?;
+    // Built before anything is opened, so that a scene with faults leaves nothing behind.
     let mut engine = build(scene, args, state)?;
     if args.record.is_some() {
         engine.record(record_settings(args)?)?;
@@ -107,6 +108,7 @@ fn serve(
     let network = network(args, &keys, &engine)?;
     let mut sessions =
         open_sessions(&network, args.listen.is_empty() && viewer.is_none() && pace.steps.is_some())?;
+    // The viewer is of this process and need not pass through the doors for those outside.
     let inside = |endpoint: &String| sessions.as_ref().and_then(|sessions| sessions.doors.inside(endpoint));
     let inside: Vec<String> = network.listen.iter().filter_map(inside).collect();
     let connect = if inside.is_empty() { network.connect.clone() } else { inside };
@@ -128,6 +130,7 @@ fn serve(
         takes_orders: args.operators != Operators::None,
         give_up,
     };
+    // From here on an interrupt ends the run in order; up to here it ended the process.
     let mut signals = {
         let _entered = foreground.enter();
         Signals::listen()?
@@ -142,6 +145,7 @@ fn serve(
         let ended = foreground.block_on(wait(&server, args, &config, &mut signals));
         let steps = server.steps();
         if let Ended::Next(next) = ended {
+            // Sessions outlive the scene, so clients stay connected while the next one begins.
             sessions = server.release()?.1;
             let Next { name, engine: built } = *next;
             engine = built;
@@ -155,6 +159,7 @@ fn serve(
         let engine = server.join()?;
         // Browsers may keep connections open; do not wait for them.
         foreground.shutdown_timeout(Duration::from_millis(200));
+        // A run of some length that was interrupted has failed, while an endless one ends in no other way.
         let unfinished = interrupted && pace.steps.is_some();
         let failures = conclude(engine, args, interrupted, (steps, started.elapsed()))?;
         return Ok(if unfinished || !failures.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS });

@@ -80,8 +80,10 @@ impl Chart {
         if points().next().is_none() {
             return String::new();
         }
+        // A logarithmic axis is a linear one of exponents.
         let height = |y: f64| if logarithmic { y.log10() } else { y };
         let x = Axis::around(points().map(|p| p[0]), false, (LEFT, WIDTH - RIGHT));
+        // The legend adds to the height, so that the frame has the same size whatever stands above it.
         let legend = self.legend();
         let top = 10.0 + ROW * legend.len() as f64;
         let total = HEIGHT + top;
@@ -126,6 +128,7 @@ impl Chart {
         let classes = self.classes();
         for (i, line) in self.lines.iter().enumerate() {
             let usable: Vec<&[f64; 2]> = line.points.iter().filter(usable).collect();
+            // Thinned evenly, but the last point stays: a curve has to end where its run did.
             let stride = usable.len().div_ceil(POINTS).max(1);
             let last = usable.len().saturating_sub(1);
             let mut path = String::new();

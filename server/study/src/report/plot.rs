@@ -296,6 +296,7 @@ impl Plot {
     fn legend(&self) -> Vec<String> {
         // Mark, name, and the series that it switches.
         let mut items: Vec<(String, String, Option<String>)> = Vec::new();
+        // A single shape tells nothing apart: it has no entry, and the marks of the colours are drawn in it.
         let single = self.shapes.len() < 2;
         for (i, name) in &self.colours {
             let mark = shape(
@@ -310,6 +311,7 @@ impl Plot {
                 items.push((shape(*i, 5.5, "mark key"), name.clone(), Some(format!("k{i}"))));
             }
         }
+        // Small plots have no room to explain lines and crosses.
         if self.size[0] > 600.0 {
             let front = "<path class=\"front\" d=\"M-9 -5H0V5H9\"/>";
             items.push((front.to_owned(), "Pareto front".to_owned(), Some("front".to_owned())));
@@ -339,6 +341,7 @@ impl Plot {
         let (mut row, mut at) = (String::new(), 0.0);
         for (mark, name, series) in items {
             let toggles = series.map_or(String::new(), |series| format!("data-toggles=\"{series}\" "));
+            // SVG breaks no lines, so the width of a name is estimated from its number of characters.
             let width = 24.0 + 7.6 * name.chars().count() as f64 + 18.0;
             if at + width > self.size[0] - LEFT - RIGHT && at > 0.0 {
                 rows.push(std::mem::take(&mut row));

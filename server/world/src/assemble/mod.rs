@@ -142,6 +142,7 @@ impl Builder<'_> {
         };
         let repaired = mesh::doubts_about_repair(health.as_ref());
         self.warnings.extend(repaired.map(|doubt| format!("{at}.mesh: {doubt}")));
+        // Before the size is judged and nodes are selected, so that crumbs of the mesh do not count.
         if let (true, mesh::Mesh::Tets(tets)) = (spec.largest_part, &mut mesh)
             && let Some(kept) = mesh::keep_largest_part(tets)
         {
@@ -150,6 +151,7 @@ impl Builder<'_> {
         let doubts = mesh::doubts_about_scale(mesh.bounds(), spec);
         self.doubts.extend(doubts.into_iter().map(|doubt| (at.clone(), doubt)));
         let along = mesh.nodes_along();
+        // How many iterations a solve may need depends on the mesh, so settings have to wait for it.
         let settings = BodySettings {
             solver: spec.mechanics.linear_solver(along, spec.poisson),
             threads: threads::of_one_body(self.bodies, self.options.threads),
@@ -179,6 +181,7 @@ impl Builder<'_> {
                 return None;
             }
         };
+        // The settings allow single precision by what they are; only the body has seen its elements.
         let law = spec.mechanics.constitutive_law();
         if settings.arithmetic(law) == Arithmetic::Single && !body.is_fast() {
             let doubt = "most elements are too flat for single precision, so mixed precision is used, which is slower";
@@ -191,6 +194,7 @@ impl Builder<'_> {
             }
         }
         let mut body = SimBody::new(&spec.id, body, health);
+        // After the skin, because an image on triangles of a surface needs these.
         if let Some(texture) = &spec.look.texture {
             let worn = body.body.kept().is_some();
             match texture::load(texture, &spec.mesh, worn, self.base_dir) {
@@ -210,6 +214,7 @@ impl Builder<'_> {
         for (i, load) in spec.loads.iter().enumerate() {
             self.load(&format!("{at}.load.{i}"), load, &mut body);
         }
+        // After all fixes, because held nodes are not thrown.
         body.velocity_m_s = spec.velocity_m_s;
         if let Err(error) = body.throw() {
             self.refused(&format!("{at}.velocity_m_s"), &error);

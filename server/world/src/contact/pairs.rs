@@ -284,11 +284,13 @@ impl PairContacts {
         let ([low, high], fastest) = self.reach[b];
         let (low, high) = (low.add_scalar(-margin), high.add_scalar(margin));
         let ([own_low, own_high], _) = self.reach[a];
+        // Boxes hold the whole paths of the step, so most pairs of bodies end here.
         if a != b && (0..3).any(|k| own_high[k] < low[k] || own_low[k] > high[k]) {
             return;
         }
         let (body, other) = (&bodies[a].body, &bodies[b].body);
         let surface = body.surface();
+        // The harmonic mean, in which the softer side decides.
         let stiffness = {
             let [soft, hard] = [a, b].map(|i| young_pa(i) / self.cells[i]);
             settings.stiffness * 2.0 * soft * hard / (soft + hard)
@@ -296,12 +298,15 @@ impl PairContacts {
         let first = self.kept.partition_point(|k| k.bodies < [a as u32, b as u32]);
         let mut next = first;
         let touched = self.kept.get(first).is_some_and(|k| k.bodies == [a as u32, b as u32]);
+        // A body in touch with itself is looked at in every step anyway and keeps no distance to spare.
         let spare = if touched { 0.0 } else { OwnSurface::spare_m(2.0 * h * fastest, cell_m) };
         for (vertex, point) in (0u32..).zip(&surface.vertices) {
+            // Vertices and contacts ascend alike, so one pass finds what each vertex remembers.
             while next < self.kept.len() && self.kept[next].key() < ([a as u32, b as u32], vertex) {
                 next += 1;
             }
             let known = self.kept.get(next).filter(|k| k.key() == ([a as u32, b as u32], vertex)).copied();
+            // Against itself most vertices of a body end here, at a bound for two sides as fast as its fastest.
             let is_unmet = a == b && known.is_none();
             if is_unmet && self.own[a].is_free(vertex, (margin + 2.0 * h * fastest + spare, cell_m)) {
                 continue;

@@ -139,6 +139,7 @@ impl Mechanics {
     /// All settings of a body, with as many iterations as any mesh may have; threads and instructions as by default.
     pub fn body_settings(&self) -> BodySettings {
         BodySettings {
+            // No mesh is known here; who has one takes the limit of iterations that suits it.
             solver: self.linear_solver(f64::INFINITY, 0.0),
             element: match self.element {
                 RawElement::Tet4 => ElementKind::Tet4,
@@ -175,6 +176,7 @@ impl Mechanics {
             method: match self.method {
                 RawMethod::Cg => Method::Cg,
                 RawMethod::Cholesky => Method::Cholesky,
+                // Relaxation is conjugate gradients, too, that go on from step to step.
                 RawMethod::Pcg | RawMethod::Relaxation => Method::Pcg,
                 RawMethod::TwoLevelPcg => Method::TwoLevelPcg,
                 RawMethod::Multigrid => Method::Multigrid,
@@ -185,6 +187,7 @@ impl Mechanics {
                 RawCycle::W => CycleShape::W,
             },
             relaxation: self.method == RawMethod::Relaxation,
+            // Left open, it follows from law, scheme and tolerance.
             arithmetic: self.precision.map(|precision| match precision {
                 RawPrecision::Single => Arithmetic::Single,
                 RawPrecision::Mixed => Arithmetic::Mixed,

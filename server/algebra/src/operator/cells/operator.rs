@@ -164,6 +164,7 @@ impl CellOperator {
         source: &dyn Fn(u32) -> u32,
     ) -> Vec<usize> {
         let known = self.places.len();
+        // A new cell joins the chunk of an earlier one near it, so that chunks stay compact and most of them untouched.
         let mut of_chunk: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &id in changed {
             let new = id as usize >= known;
@@ -189,6 +190,7 @@ impl CellOperator {
         let mut renewed: Vec<usize> = left.iter().map(|(chunk, _)| *chunk).collect();
         let directed = left.iter().any(|(_, chunk)| !chunk.x.is_empty());
         for mut chunk in arranged {
+            // Room for directions is made here, where the others have theirs: the next product then allocates nothing.
             if directed {
                 chunk.room();
             }
@@ -207,6 +209,7 @@ impl CellOperator {
         renewed.sort_unstable();
         renewed.dedup();
         renewed.iter().for_each(|&chunk| self.find_places(chunk));
+        // Editing the lists of rows pays only where few chunks have changed.
         if MANY * renewed.len() > self.chunks.len() {
             self.gather.arrange(self.chunks.iter().map(|chunk| &chunk.vertices[..]), n_vertices);
         } else {

@@ -228,6 +228,7 @@ impl Follow<'_> {
         size: u8,
     ) -> Option<Vec<u32>> {
         let Self { coarse, known, origin, history } = self;
+        // A new fine cell has no parent yet and counts where the cell lay that it was part of.
         let mut renewed: Vec<u32> =
             change.cells.iter().map(|&id| step.parent[change.before(id) as usize]).collect();
         renewed.sort_unstable();
@@ -238,6 +239,7 @@ impl Follow<'_> {
         members.sort_unstable();
         let parent_before: Vec<u32> =
             members.iter().map(|&id| step.parent[change.before(id) as usize]).collect();
+        // Vertices are numbered by what these cells were, so that is kept before anything is overwritten.
         for &id in &renewed {
             history.keep(id, coarse.now(id));
         }
@@ -254,6 +256,7 @@ impl Follow<'_> {
                         Ok(j) => {
                             join(&mut root, i, j as u32);
                         }
+                        // A link that leaves the list joins what was apart before.
                         Err(_) => whole = false,
                     }
                 }
@@ -264,6 +267,7 @@ impl Follow<'_> {
         by_root.sort_unstable();
 
         step.parent.resize(fine.cells.len(), NONE);
+        // The first group with a parent keeps the number of that; others, which the cut split off, get new ones.
         let (mut taken, mut children) = (vec![false; renewed.len()], Vec::new());
         for group in by_root.chunk_by(|a, b| a.0 == b.0) {
             let mut held = group.iter().map(|g| g.1).filter(|&i| (members[i] as usize) < change.known);
@@ -294,6 +298,7 @@ impl Follow<'_> {
             children.iter().for_each(|&child| step.parent[child as usize] = id);
             step.children.set(at, &children);
         }
+        // A parent that no group took over would leave its number unused.
         whole &= taken.iter().all(|taken| *taken);
         renewed.extend(*known as u32..coarse.cells.len() as u32);
         whole.then_some(renewed)
@@ -358,10 +363,12 @@ impl Follow<'_> {
             members.iter().for_each(|&slot| {
                 done.insert(slot);
             });
+            // What carries a hanging class may have no number yet, so such classes wait for all others.
             if hangs_on != NONE {
                 hanging.extend(members.iter().map(|&slot| (slot, hangs_on)));
                 continue;
             }
+            // The lowest number that one of the corners had. Parts that come later find it taken and get new ones.
             let known = members.iter().filter_map(|&slot| self.vertex_before(slot));
             let vertex = known.filter(|&v| !taken.has(v)).min().unwrap_or_else(|| {
                 self.coarse.n_vertices += 1;
@@ -403,6 +410,7 @@ impl Follow<'_> {
             let k = self.coarse.corner_at(big, q)?;
             self.enter(slot, self.coarse.vertices[big as usize][k], true);
         }
+        // A number without a taker is a vertex without corners: classes have grown together.
         owed.is_within(&taken).then_some(())
     }
 

@@ -299,6 +299,7 @@ impl Galerkin {
             stored.reserve_exact(more + (stored.len() + more) / spare);
         }
         for id in 0..matrix.len() {
+            // Up to here `changed` held which cells are cubes; from now on it means what its name says.
             let cube = changed[id];
             changed[id] = anew;
             match (matrix[id], cube) {
@@ -323,8 +324,10 @@ impl Galerkin {
                 _ => {}
             }
         }
+        // A cut or other prescribed directions came upon these cells, whatever became of their matrices above.
         let mut any = !touched.is_empty();
         touched.drain(..).for_each(|id| changed[id as usize] = true);
+        // Prescribed directions enter once, above the level on which they are given; higher levels inherit them.
         let held = match l {
             1 => &self.fixed[..],
             _ if l == self.first + 1 => &self.held_bits[..],
@@ -347,6 +350,7 @@ impl Galerkin {
         team.for_blocks(blocks(stored, STORED_BLOCK), |_, stored| {
             context.refresh(simd, stored, frame, (within, anew));
         });
+        // The level above reads `changed`, so stale matrices are booked before its turn.
         for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
             changed[stored.cell as usize] |= stored.stale;
             any |= stored.stale;

@@ -98,6 +98,7 @@ impl LevelKernel {
         if self.fresh {
             self.arrange(level, &galerkin.levels[l]);
         }
+        // A cut can bring new kinds even where the constants stay.
         if anew || self.operator.n_tables() != galerkin.shared.len() {
             let table = |shared: &super::dense::Dense| SectorTable::of_matrix(&shared.wide()).0;
             self.operator.set_tables(&galerkin.shared.iter().map(table).collect::<Vec<_>>());
@@ -119,11 +120,13 @@ impl LevelKernel {
         // All cells of a chunk that is arranged anew lose their matrices.
         if any {
             let lane = |id: u32| lane(level, id as usize, lane_matrix(matrices.matrix[id as usize]));
+            // Without a cut the vertices stay, and only cells whose matrix is held in another form move.
             let renewed = if !cut.is_empty() {
                 moved[known..].fill(true);
                 cut.drain(..).for_each(|id| moved[id as usize] = true);
                 let changed: Vec<u32> =
                     (0u32..).zip(&*moved).filter(|(_, moved)| **moved).map(|(id, _)| id).collect();
+                // A new cell may come from one that an earlier cut of the series added: back to one that is arranged.
                 let source = |mut id: u32| {
                     while let Some(new) = (id as usize).checked_sub(known) {
                         id = origin[new];
@@ -144,6 +147,7 @@ impl LevelKernel {
         operator.set_rotations(team, rotation);
         operator.set_stored_rotations(team, rotation);
         let (moved, fresh) = (&*moved, std::mem::take(fresh));
+        // Stored matrices are large, so only those that changed or lost their place are copied.
         operator.set_stored(team, &UPPER, |id| {
             let id = id as usize;
             let entries = match matrices.matrix[id] {

@@ -66,6 +66,7 @@ impl Context<'_> {
         let children = self.hierarchy.steps[self.l - 1].children_of(id);
         let to_frame = frame.inverse();
         let relative = |c: u32| to_frame * self.fine.frame[c as usize];
+        // Rotations count relative to the frame: where all children turn alike, nothing is computed.
         stored.stale |= anew
             || children
                 .iter()
@@ -92,6 +93,7 @@ impl Context<'_> {
             let turn =
                 (!same.holds(known, &Rotation::identity())).then(|| known.to_rotation_matrix().into_inner());
             let merges = fine.cells[child].level != cell.level;
+            // The usual child: its kind and place have a matrix in the corners of the parent, ready to be added.
             if let Some(A) = self.carried(child).filter(|_| merges && thin.is_none()) {
                 match turn {
                     Some(Q) => sum.add::<V>(&A.rotated::<V>(&Q)),
@@ -102,6 +104,7 @@ impl Context<'_> {
             let mut A = cell_matrix(self.hierarchy, (self.l - 1, child), self.fine, self.shared, self.eighth);
             let holds =
                 !self.held.is_empty() && fine.vertices[child].iter().any(|&v| self.held[v as usize] != 0);
+            // One that rests on its own corners needs its octant only, not the weights of every corner.
             if merges && thin.is_none() && !holds && fine.hanging[child] == 0 {
                 let A = match turn {
                     Some(Q) => A.rotated_flipped::<V>(&Q),
@@ -113,6 +116,7 @@ impl Context<'_> {
             if let Some(Q) = turn {
                 A = A.rotated::<V>(&Q);
             }
+            // Directions are those of the world, and so is the frame of a cell that is held in some of them only.
             if holds {
                 for (c, &v) in fine.vertices[child].iter().enumerate() {
                     match self.held[v as usize] {
@@ -133,6 +137,7 @@ impl Context<'_> {
         if !coarse.leaf[id] && coarse.hanging[id] != 0 {
             sum = sum.carried::<V>(&weights(cell, coarse.hanging[id]));
         }
+        // Last, because every child adds to the equations of the inner vertices.
         if let Some(thin) = thin {
             thin.relax::<V>(&mut sum, &mut stored.inner);
         }

@@ -130,6 +130,7 @@ impl<'a> Thin<'a> {
         is_held: impl Fn(u32) -> bool,
         equations: &'a mut Equations,
     ) -> Option<Self> {
+        // Only the slots tell which cells share a vertex.
         if !fine.has_slots() {
             return None;
         }
@@ -176,6 +177,7 @@ impl<'a> Thin<'a> {
                 let end = |at| bit([0, 1, 2].map(|a| if a == k { at } else { places[i][a] }));
                 places[i][k] == 1 && taken & end(0) != 0 && taken & end(2) != 0
             });
+            // A vertex that another coarse cell also has must move trilinearly for both.
             let own = |(child, _): (usize, usize)| step.parent[child] as usize == id;
             if between && fine.slots_of(v as usize).all(own) {
                 if thin.n == INNER {
@@ -185,6 +187,7 @@ impl<'a> Thin<'a> {
                 thin.n += 1;
             }
         }
+        // The room still holds the equations of the cell before.
         let n = 3 * thin.n;
         thin.equations.A[..n].fill([Lanes::default(); ROW]);
         thin.equations.AW[..n].fill(Default::default());

@@ -54,6 +54,7 @@ impl Interpolation {
     ) -> Self {
         let located: Vec<_> = points.iter().map(|point| lattice.locate(point)).collect();
         let cell = |node: u32| located[node as usize].0;
+        // Nodes of a cell are one part only where elements connect them, so the sides of a cut stay apart.
         let mut root: Vec<u32> = (0..points.len() as u32).collect();
         for_groups(&mut |group| {
             for (i, &a) in group.iter().enumerate() {
@@ -79,6 +80,7 @@ impl Interpolation {
             nodes.push(Node { part, applied: part, place: located[node as usize].1 });
         }
         let part = |node: u32| nodes[node as usize].part;
+        // Corners of neighbouring cells are united in the same way: no coarse unknown reaches across a cut.
         let mut root: Vec<u32> = (0..8 * cells.len() as u32).collect();
         for_groups(&mut |group| {
             for (i, &a) in group.iter().enumerate() {
@@ -99,6 +101,7 @@ impl Interpolation {
             }
             corners[at as usize / 8][at as usize % 8] = number[smallest as usize];
         }
+        // Not before: nodes that are left out connect parts like all others, and keep their weights.
         for (node, known) in (0..).zip(&mut nodes) {
             if left_out(node) {
                 known.applied = NONE;

@@ -107,9 +107,11 @@ fn diagonal(
         bench.begin(format!("cube, {}", way.name), total)?;
         let mut made = cut_cube(way, &plane)?;
         let mut cut_s = made.cut_s;
+        // Repeated on fresh cubes for the time alone; the first one is kept for all other figures.
         for _ in 1..RUNS {
             cut_s = cut_s.min(cut_cube(way, &plane)?.cut_s);
         }
+        // Before the body relaxes, which takes the lips off the plane.
         let off = made.off_m(&[plane]) * cube::CELLS as f64 / cube::EDGE_M;
         let flat = made.flat();
         let [plain, blocks] = relax(&mut made.body)?;
@@ -117,6 +119,7 @@ fn diagonal(
         let counts =
             [of.faces, of.flattened, of.collapses, of.splits, flat, of.refused].map(|n| Some(n as f64));
         let sizes = [made.body.n_elements(), made.body.n_nodes()].map(|n| Some(n as f64));
+        // The last two ways differ by the cleaning, and so do their times.
         let cleaning_s = (way == WAYS[3]).then_some(cut_s - pressed_s);
         pressed_s = cut_s;
         let iterations = [plain, blocks].map(|n| Some(f64::from(n)));
@@ -130,6 +133,7 @@ fn diagonal(
         table.row(way.name, &row);
         result.pictures.push(view::body(&made.body, format!("Cube, {}, in equilibrium.", way.name)));
     }
+    // The thesis has counts of its own way only, before and after elements were removed.
     let n = |n: f64| Some(n);
     table.printed(
         "thesis, not cleaned",

@@ -326,6 +326,7 @@ fn clamped(setting: &Setting) -> Result<Evidence, Trouble> {
     let (start, mass) = fallen(&watch);
     evidence.at_least("mass of the loose part over all", mass / watch.body.total_mass(), 0.9, "");
     watch.steps(20);
+    // n steps of implicit Euler fall by h² n (n + 1)/2 g, here with h = 10 ms and n = 20.
     let way = 1e-4 * 20.0 * 21.0 / 2.0 * DOWN;
     let off = (fallen(&watch).0 - start - way).norm() / way.norm();
     evidence.at_most("deviation of its fall from free fall", off, 1e-6, "off");
@@ -349,6 +350,7 @@ fn clamped(setting: &Setting) -> Result<Evidence, Trouble> {
     watch.steps(50);
     let body = watch.finish(&mut common, &mut energies, &mut iterations);
     evidence.exactly("clamped nodes that moved, cut through the clamp", moved(&body, &clamp), 0);
+    // A part that had come loose would be twelve edges below after 0.5 s.
     let low = body.positions().iter().map(|x| x.y).fold(f64::INFINITY, f64::min);
     evidence.at_least("lowest point", low / L, -0.1, "edges");
     // Exactly along a layer of nodes that ends in the clamp.
@@ -363,6 +365,7 @@ fn clamped(setting: &Setting) -> Result<Evidence, Trouble> {
     let clamped = copies.filter(|(node, _)| clamp.contains(node));
     let (all, still) =
         clamped.fold((0, 0), |(all, still), (_, (x, X))| (all + 1, still + usize::from(x == X)));
+    // The layer has five nodes in the clamp. The cut doubles them, and both copies have to stay.
     evidence.exactly("copies of clamped nodes, cut along nodes", all, clamp.len() + 5);
     evidence.exactly("of these, moved", all - still, 0);
     tell(&flaws, &mut evidence);

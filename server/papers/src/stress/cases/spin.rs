@@ -159,12 +159,14 @@ fn step_sweep(setting: &Setting) -> Result<Evidence, Trouble> {
                     let seconds: f64 = if h < 1e-3 { 0.02 } else { f64::min(2.0, 100.0 * h) };
                     let spin = spin(&mut watch, (seconds / h).round() as usize);
                     let excess = spin.most_energy - 1.0;
+                    // NaN must win; a plain comparison would lose it.
                     worst = if excess.is_nan() || excess > worst { excess } else { worst };
                     // On the fast path this spin turns too far in its first step.
                     fast_turns += u32::from(with.is_none() && omega * h > 4.5);
                     told += u32::from(with.is_none() && spin.notices > 0);
                     // BDF2 starts with a step of implicit Euler, so it always has something to report.
                     silent += usize::from(name == "BDF2" && spin.notices == 0);
+                    // Two runs of every integrator are drawn, while the common rule counts all.
                     if young == 1e5 && omega == 10.0 && (h == 2e-2 || h == 0.2) {
                         watch.finish(&mut common, &mut energies, &mut iterations);
                     } else {
@@ -180,6 +182,7 @@ fn step_sweep(setting: &Setting) -> Result<Evidence, Trouble> {
                 "",
             );
         }
+        // The guard may act more often, but not more rarely than the spin demands.
         if with.is_none() {
             evidence.at_least(
                 "runs of the fast path with a notice of its guard",

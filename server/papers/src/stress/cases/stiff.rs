@@ -116,6 +116,7 @@ fn layers(_: &Setting) -> Result<Evidence, Trouble> {
     let kinds: [Kind; 2] = [("inclusion", &inclusion), ("layers", &layers)];
     for (name, stiff) in kinds {
         let K = stiffness(&mesh, stiff)?;
+        // Both materials have the same density, so stiffness is all that tells them apart.
         let mass = Model::tet4(&mesh, &linear(1e3), Volumetric::Full)?.lumped_mass(1e3);
         let fixed: Vec<FixedCopy> = nodes(&mesh.nodes, |X| X.x == 0.0)
             .into_iter()
@@ -143,11 +144,13 @@ fn layers(_: &Setting) -> Result<Evidence, Trouble> {
         for step in 1..=25 {
             K.multiply(&u, &mut Ku);
             let b: Vec<V> = (0..n).map(|i| mass[i] * (v[i] + h * DOWN) - h * Ku[i]).collect();
+            // The search begins with the velocity of the last step.
             let report = solver.solve(&mut team, &A, &b, &mut v, None);
             most = most.max(report.iterations);
             missed += usize::from(report.stop != StopReason::Converged);
             u.iter_mut().zip(&v).for_each(|(u, v)| *u += h * v);
             not_finite += v.iter().chain(&u).filter(|v| !v.iter().all(|c| c.is_finite())).count();
+            // Implicit Euler only takes energy out, so kinetic and elastic energy stay below the work of gravity.
             let kinetic: f64 = mass.iter().zip(&v).map(|(m, v)| 0.5 * m * v.norm_squared()).sum();
             let elastic = 0.5 * K.bilinear(&u, &u);
             let work: f64 = mass.iter().zip(&u).map(|(m, u)| m * DOWN.dot(u)).sum();
@@ -172,6 +175,7 @@ fn layers(_: &Setting) -> Result<Evidence, Trouble> {
         ));
     }
     evidence.charts.extend([energies, iterations]);
+    // The same two arrangements on octree cells, in a cube of 1 m.
     let centred: (&str, Inside) = ("inclusion", |X| (X - V::repeat(0.5)).amax() < 0.25);
     for (name, stiff) in [centred, ("layers", |X| (X.z / 0.25) as usize % 2 == 1)] {
         cells_with(name, stiff, &mut evidence)?;

@@ -91,6 +91,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         RawMass::Floored => ", floored mass",
         RawMass::Consistent => ", consistent mass",
     };
+    // What the body will compute with, which the scene may have left open.
     let precision = match m.arithmetic() {
         Arithmetic::Single => "single",
         Arithmetic::Mixed => "mixed",
@@ -98,6 +99,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
     };
     let cycles = if m.cycle == RawCycle::W { "W-cycles" } else { "cycles" };
     let solver = match m.method {
+        // An explicit step solves nothing, whatever method stands in the scene.
         _ if m.integrator.is_explicit() => "no solver".into(),
         RawMethod::Cholesky => format!("cholesky, {precision}"),
         RawMethod::Relaxation => {
@@ -130,6 +132,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
             _ => "matrix-free",
         };
         match m.operator {
+            // Cells are never assembled, so nobody chose.
             _ if m.body_settings().has_cells() => format!("fast path, {operator}"),
             Some(_) => format!("fast path, {operator}: set by the scene"),
             None => format!("fast path, {operator}: it costs less"),
@@ -137,6 +140,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
     } else if m.integrator.is_explicit() || m.method == RawMethod::Relaxation {
         "general path, forces only".into()
     } else {
+        // If nothing else is in the way, it is the precision or a tolerance too fine for single precision.
         let why = m.why_general().unwrap_or("the chosen precision");
         format!("general path for {why}, assembled")
     };
