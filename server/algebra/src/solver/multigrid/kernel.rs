@@ -88,6 +88,12 @@ impl LevelKernel {
         self.cut.extend_from_slice(&change.moved);
     }
 
+    /// Takes the matrices that cells of a kind share.
+    fn set_tables(&mut self, galerkin: &Galerkin) {
+        let table = |shared: &super::dense::Dense| SectorTable::of_matrix(&shared.wide()).0;
+        self.operator.set_tables(&galerkin.shared.iter().map(table).collect::<Vec<_>>());
+    }
+
     /// Follows an update of the matrices of level `l`; `anew` if those of the kinds changed.
     pub(super) fn follow(
         &mut self,
@@ -100,8 +106,7 @@ impl LevelKernel {
         }
         // A cut can bring new kinds even where the constants stay.
         if anew || self.operator.n_tables() != galerkin.shared.len() {
-            let table = |shared: &super::dense::Dense| SectorTable::of_matrix(&shared.wide()).0;
-            self.operator.set_tables(&galerkin.shared.iter().map(table).collect::<Vec<_>>());
+            self.set_tables(galerkin);
         }
         let matrices = &galerkin.levels[l];
         let Self { operator, arranged, moved, origin, cut, fresh, stored, .. } = self;
