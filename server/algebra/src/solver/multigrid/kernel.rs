@@ -109,7 +109,7 @@ impl LevelKernel {
             self.set_tables(galerkin);
         }
         let matrices = &galerkin.levels[l];
-        let Self { operator, arranged, moved, origin, cut, fresh, stored, .. } = self;
+        let Self { operator, arranged, moved, origin, cut, stored, .. } = self;
         let lane_matrix = |matrix| lane_matrix(matrix, *stored);
         let (known, n) = (arranged.len(), level.cells.len());
         moved.resize(n, true);
@@ -147,6 +147,12 @@ impl LevelKernel {
             }
         }
         origin.clear();
+        self.take_matrices(team, matrices);
+    }
+
+    /// Takes rotations and stored matrices.
+    fn take_matrices(&mut self, team: &mut Team, matrices: &LevelMatrices) {
+        let Self { operator, moved, fresh, .. } = self;
         let rotation =
             |id: u32| -> Matrix3<f32> { matrices.frame[id as usize].to_rotation_matrix().into_inner() };
         operator.set_rotations(team, rotation);
