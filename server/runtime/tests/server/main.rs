@@ -7,6 +7,7 @@ mod doctor;
 mod house;
 mod mcap_writer;
 mod recording;
+mod sibling;
 mod textured;
 mod two_hands;
 mod wire;

@@ -1,7 +1,5 @@
 //! Commands of `scindo` that the program `scindo-papers` beside it runs.
 
-#![allow(clippy::unwrap_used)]
-
 use std::fs::{self, Permissions};
 use std::io::{BufRead as _, BufReader};
 use std::os::unix::fs::PermissionsExt as _;
