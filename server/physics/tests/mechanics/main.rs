@@ -20,6 +20,7 @@ mod hex8_cubes;
 mod inclined;
 mod multigrid;
 mod multistep;
+mod own_skin;
 mod octree;
 mod octree_statics;
 mod paths;
