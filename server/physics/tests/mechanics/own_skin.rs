@@ -37,10 +37,10 @@ fn bend(X: &Vector3<f64>) -> Vector3<f64> {
     X + 0.05 * Vector3::new((9.0 * X.y).sin(), (7.0 * X.z).cos(), (8.0 * X.x).sin())
 }
 
-/// The triangles by where their corners rest [m], in no order.
-fn places(surface: &Surface, rest: &[Vector3<f64>]) -> Vec<[[u64; 3]; 3]> {
+/// The places of the corners of all triangles with the vertices of cells at `x` [m], bit for bit, in ascending order.
+fn places(surface: &Surface, x: &[Vector3<f64>]) -> Vec<[[u64; 3]; 3]> {
     let place =
-        |v: &u32| <[f64; 3]>::from(surface.vertices[*v as usize].position(rest)).map(|c| (c + 0.0).to_bits());
+        |v: &u32| <[f64; 3]>::from(surface.vertices[*v as usize].position(x)).map(|c| (c + 0.0).to_bits());
     let mut all: Vec<_> =
         surface.triangles.iter().map(|t| [place(&t[0]), place(&t[1]), place(&t[2])]).collect();
     all.iter_mut().for_each(|t| {
@@ -51,7 +51,7 @@ fn places(surface: &Surface, rest: &[Vector3<f64>]) -> Vec<[[u64; 3]; 3]> {
     all
 }
 
-/// Closed and complete; returns the volume [m³] that the skin encloses.
+/// Checks that the skin is closed and encloses as many parts as the cells have; returns the volume [m³] that the skin encloses.
 fn enclosed(space: &OctreeSpace) -> f64 {
     let flaws = space.flaws();
     assert!(flaws.surface == 0 && flaws.volume < 1e-12, "{flaws:?}");
@@ -74,19 +74,18 @@ fn a_skin_of_own_triangles_follows_refinement_cuts_coarsening_and_reset() {
         assert!((enclosed(&space) - whole).abs() < 1e-12);
         let start = places(space.surface(), &space.rest_positions());
 
-        // Refinement leaves every triangle where it was
+        // Refinement leaves every triangle where it was.
         let cells = space.octree().cells();
         let large: Vec<u32> = (0..cells.len() as u32).filter(|&id| cells[id as usize].level > 0).collect();
-        let refined = space.refine(&large);
-        assert!(refined.change.divided > 0);
+        assert!(space.refine(&large).change.divided > 0);
         assert!((enclosed(&space) - whole).abs() < 1e-12);
-        // and ties it to the vertices that are new, as a skin is tied that was put on afterwards.
+        // It also ties the skin to the new vertices: a skin that is put on afterwards moves in the same way.
         let mut fresh = OctreeSpace::new(space.octree().clone());
         wear(&mut fresh, scale).unwrap();
         let bent: Vec<Vector3<f64>> = space.rest_positions().iter().map(bend).collect();
         assert!(places(space.surface(), &bent) == places(fresh.surface(), &bent), "{scale}");
 
-        // Cuts show at once, and take no volume away where the skin lies on the cells.
+        // Cuts take no volume away. Around them, the surface of the cells replaces the skin, which may be smaller.
         let corner = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
         let through = |y: f64| [corner(0.4, y, -0.2), corner(0.47, y, 1.2)];
         let slit = |y: f64| [corner(0.7, y, 1.2), corner(0.8, y, 0.6)];
@@ -111,6 +110,7 @@ fn a_skin_of_own_triangles_follows_refinement_cuts_coarsening_and_reset() {
         assert!((enclosed(&space) - before).abs() < 1e-12);
         assert!(space.surface().tags.contains(&1) && space.surface().tags.contains(&2));
 
+        // Only an uncut body takes a skin, and reset gives it back as it was.
         assert!(matches!(wear(&mut space, scale), Err(SkinError::AlreadyCut)));
         space.reset().unwrap();
         assert!(places(space.surface(), &space.rest_positions()) == start, "{scale}");
