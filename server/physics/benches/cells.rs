@@ -74,7 +74,7 @@ fn measure(name: &str, settings: OctreeSettings, rounds: usize, machine: [[f64; 
     for threads in [1, 2] {
         let mut team = Team::new(threads).unwrap();
         let update = best(rounds.min(40), || {
-            assert_eq!(stiffness.update(&mut team, &WITH, black_box(&positions)), 0);
+            assert_eq!(stiffness.update(&mut team, &WITH, black_box(&positions), None), 0);
         });
         let first = best(rounds, || stiffness.multiply(&mut team, black_box(&x)));
         let whole = best(rounds, || apply(&mut stiffness, &mut team, black_box(&x), black_box(&mut y)));

@@ -106,7 +106,7 @@ fn measure(octree: &Octree, threads: usize) {
         low.map(|(copy, _)| FixedCopy { copy, held: [true; 3].into(), position_m: [0.0; 3] }).collect();
     let mut A = CellStiffness::new(Simd::detect(), octree, &[]);
     let x = octree.rest_positions();
-    A.update(&mut team, &ElasticUpdate { lame: LAME, law: Law::Linear, scale: 1.0 }, &x);
+    A.update(&mut team, &ElasticUpdate { lame: LAME, law: Law::Linear, scale: 1.0 }, &x, None);
     let mut diagonal = vec![[0.0; 8]; x.len()];
     let K = &A;
     team.for_blocks(blocks(&mut diagonal, BLOCK), |block, d| K.diagonals(block, d));

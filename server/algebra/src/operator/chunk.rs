@@ -11,8 +11,10 @@ use super::chunks::{NO_PIECE, pack, plan_chunk};
 use super::edges::EdgeBlocks;
 use super::kernel::Batches;
 use super::shared_lanes::Merged;
+use super::stiffness::UpdateAt;
 use super::strips::{AS_IN_MESH, Corners, corners_of};
 use super::tet_batch::{Block6, Coefficients, EnergyCoefficients, Locals, RestBatch};
+use super::tet_lanes::Found;
 use super::{Padded, padded};
 
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -225,14 +227,15 @@ impl Chunk {
         }
     }
 
-    /// y = s K̂ x; `y` may have more rows than the chunk uses.
+    /// y = s K̂ x, `with_twists` or as damping has it; `y` may have more rows than the chunk uses.
     #[inline(always)]
-    pub(super) fn apply(&self, simd: Simd, y: &mut [Padded]) {
+    pub(super) fn apply(&self, simd: Simd, with_twists: bool, y: &mut [Padded]) {
         let y = self.used(y);
         y.fill([0.0; 4]);
+        // The assembled stiffness contains the twists.
         match &self.edges {
-            Some(edges) => edges.apply(simd, &self.x, y),
-            None => self.batches.apply(simd, &self.x, y),
+            Some(edges) if with_twists || !self.batches.is_twisted() => edges.apply(simd, &self.x, y),
+            _ => self.batches.apply(simd, with_twists, &self.x, y),
         }
     }
 
@@ -253,32 +256,47 @@ impl Chunk {
             *local = padded(&(displacement(copy, rest) - origin));
         }
         let y = self.used(y);
-        self.apply(simd, y);
+        self.apply(simd, false, y);
         let factor = 1.0 / scale;
         for f in y.iter_mut().flatten() {
             *f *= factor;
         }
     }
 
-    /// Updates rotations, gradients, internal forces `f` and diagonal blocks.
-    pub(super) fn update(
-        &mut self,
-        simd: Simd,
-        c: &Coefficients,
-        positions: &[Vector3<f64>],
-        f: &mut [Padded],
-        diagonal: &mut [Block6],
-    ) {
+    /// Reads the positions of the chunk's copies.
+    fn gather(&mut self, positions: &[Vector3<f64>]) {
         for (local, &copy) in self.positions.iter_mut().zip(&self.copies) {
             let x = &positions[copy as usize];
             *local = [x.x, x.y, x.z, 0.0];
         }
+    }
+
+    /// Updates rotations, gradients, internal forces `f` and diagonal blocks, and twists at the positions of the tension.
+    pub(super) fn update(
+        &mut self,
+        simd: Simd,
+        c: &Coefficients,
+        at: UpdateAt<'_>,
+        f: &mut [Padded],
+        diagonal: &mut [Block6],
+    ) {
+        let UpdateAt { positions, tension } = at;
+        if let Some(tension) = tension.filter(|_| c.damping > 0.0) {
+            self.gather(tension.start);
+            self.batches.note_start(simd, &self.positions);
+        }
+        self.gather(positions);
         let (f, diagonal) = (self.used(f), self.used(diagonal));
         f.fill([0.0; 4]);
         diagonal.fill([0.0; 8]);
         let mut locals = Locals { x: &self.positions, f, blocks: diagonal };
-        self.inverted = self.batches.update(simd, c, &mut locals);
+        let Found { inverted, pulled } = self.batches.update(simd, c, &mut locals);
+        self.inverted = inverted;
         self.stale = false;
+        if let (true, Some(twists), Some(tension)) = (pulled, &c.twists, tension) {
+            self.gather(tension.at);
+            self.batches.find_twists(simd, twists, &self.positions, diagonal);
+        }
     }
 
     /// Computes the energy with the rotations of the last update.

@@ -7,6 +7,7 @@
 
 #![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
 
+use nalgebra::{Matrix3, Vector3};
 use scindo_matter::element::{Ids, LANES, Lanes, Simd, Vector8};
 
 use super::Padded;
@@ -103,7 +104,7 @@ impl EdgeBlocks {
     }
 
     /// Sums the blocks of the tets as they are in `tets`: with the gradients g′ of the kernel,
-    /// K_ab = ½ (g′_a·g′_b I + g′_b g′_aᵀ) + λ/2μ g′_a g′_bᵀ.
+    /// K_ab = ½ (g′_a·g′_b I + g′_b g′_aᵀ) + λ/2μ g′_a g′_bᵀ, and −½ [g′_a]× Q [g′_b]× with twists.
     pub(super) fn assemble(&mut self, tets: &Batches) {
         for batch in &mut self.batches {
             batch.block = [[Lanes::default(); 3]; 3];
@@ -125,6 +126,13 @@ impl EdgeBlocks {
                             *entry += 0.5 * b[r] * a[s] + tets.ratio() * a[r] * b[s];
                             *entry += if r == s { half_dot } else { 0.0 };
                         }
+                    }
+                    let Some([xx, xy, xz, yy, yz, zz]) = tets.twist(t, lane) else { continue };
+                    let Q = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+                    let [cross_a, cross_b] = [a, b].map(|g| Vector3::from(*g).cross_matrix());
+                    let twist = cross_a * Q * cross_b * -0.5;
+                    for (r, s) in (0..9).map(|k| (k / 3, k % 3)) {
+                        block[r][s].0[slot % LANES] += twist[(r, s)];
                     }
                 }
             }

@@ -16,7 +16,9 @@ use super::chunks::{Gather, NO_PIECE};
 use super::groups::Groups;
 use super::rows::{self, Sum, gather_direction};
 use super::shared_lanes::{LaneChanges, SharedLanes};
-use super::stiffness::{Direction, ElasticUpdate, OperatorChoice, Place, Stiffness, apply};
+use super::stiffness::{
+    Direction, ElasticUpdate, OperatorChoice, Place, Stiffness, Tension, UpdateAt, apply,
+};
 use super::tet_batch::{Block6, Coefficients, EnergyCoefficients};
 use super::{BLOCK, LinearOperator, Padded, block_of};
 
@@ -157,15 +159,17 @@ impl Elastic {
         self.chunks.sort_by_key(|chunk| chunk.group);
     }
 
-    /// Arranges the sums of the present chunks. Chunks keep their rows if these suffice. Otherwise
-    /// diagonal blocks of chunks that are not stale move along.
+    /// Arranges the sums of the present chunks, in the rows that there are if these suffice. Diagonal blocks of chunks that
+    /// are not stale move along.
     fn arrange_sums(&mut self, n_copies: usize) {
         let copies = self.chunks.iter().map(|c| &c.copies[..]);
         if self.gather.holds(copies.clone()) {
-            return self.gather.arrange(copies, n_copies);
+            self.gather.arrange(copies, n_copies);
+        } else {
+            self.gather = Gather::new(copies, n_copies);
+            self.sums = vec![[0.0; 4]; self.gather.n_rows()];
         }
-        self.gather = Gather::new(copies, n_copies);
-        self.sums = vec![[0.0; 4]; self.gather.n_rows()];
+        // A chunk has other rows also where those of another one now suffice for it.
         let kept = std::mem::replace(&mut self.diagonals, vec![[0.0; 8]; self.gather.n_rows()]);
         for (chunk, &first) in self.chunks.iter_mut().zip(&self.gather.first_row) {
             let (from, to) = (chunk.first_row, first as usize);
@@ -205,7 +209,7 @@ impl Elastic {
         f_int: &mut [Padded],
         diagonal: &mut [Block6],
     ) -> usize {
-        let inverted = Stiffness::update(self, team, with, positions);
+        let inverted = Stiffness::update(self, team, with, positions, None);
         let elastic = &*self;
         team.for_blocks((blocks(f_int, BLOCK), blocks(diagonal, BLOCK)), |block, (f, diagonal)| {
             elastic.forces(block, f);
@@ -234,6 +238,19 @@ impl Elastic {
         product.total()
     }
 
+    fn multiply_chunks(&mut self, team: &mut Team, x: &[Padded], with_twists: bool) {
+        let simd = self.simd;
+        let sums = ranges(&mut self.sums, &self.gather.first_row);
+        team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {
+            chunk[0].ask_for_stiffness();
+            let Chunk { copies, x: local, .. } = &mut chunk[0];
+            for (local, &copy) in local.iter_mut().zip(copies.iter()) {
+                *local = x[copy as usize];
+            }
+            chunk[0].apply(simd, with_twists, y);
+        });
+    }
+
     /// Rotation of every piece at the last update.
     pub fn rotations(&self) -> Vec<Matrix3<f32>> {
         self.places().iter().map(|&place| self.rotation(place)).collect()
@@ -253,7 +270,13 @@ impl Elastic {
 impl Stiffness for Elastic {
     /// Every chunk's own sums. Without rotations the stiffness changes only if
     /// `with` or the pieces do; otherwise one application is enough.
-    fn update(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> usize {
+    fn update(
+        &mut self,
+        team: &mut Team,
+        with: &ElasticUpdate,
+        positions: &[Vector3<f64>],
+        tension: Option<&Tension<'_>>,
+    ) -> usize {
         let (simd, groups, c) = (self.simd, &self.groups, Coefficients::of(with, with.lame));
         let assembled = match self.choice {
             OperatorChoice::Auto => !c.rotates,
@@ -268,8 +291,8 @@ impl Stiffness for Elastic {
             let sums = (ranges(&mut self.sums, first), ranges(&mut self.diagonals, first));
             team.for_blocks((blocks(&mut self.chunks, 1), sums.0, sums.1), |_, (chunk, y, diagonal)| {
                 if all || chunk[0].stale {
-                    let c = groups.coefficients(chunk[0].group, with);
-                    chunk[0].update(simd, &c, positions, y, diagonal);
+                    let c = groups.coefficients(chunk[0].group, with, tension);
+                    chunk[0].update(simd, &c, UpdateAt { positions, tension }, y, diagonal);
                     chunk[0].assemble(assembled);
                 }
             });
@@ -286,7 +309,7 @@ impl Stiffness for Elastic {
     fn energy(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> Option<f64> {
         let (simd, groups) = (self.simd, &self.groups);
         team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
-            let Coefficients { mu, lambda, rotates, .. } = groups.coefficients(chunk[0].group, with);
+            let Coefficients { mu, lambda, rotates, .. } = groups.coefficients(chunk[0].group, with, None);
             chunk[0].find_energy(simd, EnergyCoefficients { mu, lambda, rotates }, positions);
         });
         Some(self.chunks.iter().map(|chunk| chunk.energy).sum())
@@ -305,16 +328,11 @@ impl Stiffness for Elastic {
     }
 
     fn multiply(&mut self, team: &mut Team, x: &[Padded]) {
-        let simd = self.simd;
-        let sums = ranges(&mut self.sums, &self.gather.first_row);
-        team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {
-            chunk[0].ask_for_stiffness();
-            let Chunk { copies, x: local, .. } = &mut chunk[0];
-            for (local, &copy) in local.iter_mut().zip(copies.iter()) {
-                *local = x[copy as usize];
-            }
-            chunk[0].apply(simd, y);
-        });
+        self.multiply_chunks(team, x, true);
+    }
+
+    fn multiply_damping(&mut self, team: &mut Team, x: &[Padded]) {
+        self.multiply_chunks(team, x, false);
     }
 
     fn multiply_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32) {
@@ -324,7 +342,7 @@ impl Stiffness for Elastic {
             chunk[0].ask_for_stiffness();
             let Chunk { copies, x: local, .. } = &mut chunk[0];
             gather_direction(local, copies, z, beta);
-            chunk[0].apply(simd, y);
+            chunk[0].apply(simd, true, y);
         });
     }
 

@@ -5,8 +5,9 @@
 use nalgebra::Vector3;
 use scindo_matter::material::{Lame, Region, Regions};
 
-use super::stiffness::ElasticUpdate;
+use super::stiffness::{ElasticUpdate, Tension};
 use super::tet_batch::Coefficients;
+use super::twist::TwistCoefficients;
 
 /// Elements per group: local vectors, gradients and indices of a chunk stay near the core, and a
 /// body of a few thousand pieces still has work for several threads.
@@ -52,9 +53,22 @@ impl Groups {
     }
 
     /// Coefficients of a group in an update whose constants are those of the body.
-    pub(super) fn coefficients(&self, group: usize, with: &ElasticUpdate) -> Coefficients {
+    pub(super) fn coefficients(
+        &self,
+        group: usize,
+        with: &ElasticUpdate,
+        tension: Option<&Tension<'_>>,
+    ) -> Coefficients {
         let region = Region::numbered(&self.constants, self.regions[group]);
-        Coefficients::of(with, region.map_or(with.lame, Region::lame))
+        let lame = region.map_or(with.lame, Region::lame);
+        let twists = tension.filter(|_| with.law.rotates()).map(|tension| {
+            // Without inertia nothing is heavy.
+            let own = region.map_or(tension.density_kg_m3, |region| region.density_kg_m3);
+            let density = if tension.density_kg_m3 > 0.0 { own } else { 0.0 };
+            TwistCoefficients::new(lame, density, tension.s, with.scale)
+        });
+        let damping = tension.map_or(0.0, |tension| tension.damping as f32);
+        Coefficients { twists, damping, ..Coefficients::of(with, lame) }
     }
 }
 
@@ -62,7 +76,7 @@ impl Coefficients {
     /// Those of an update for a material of these Lamé constants.
     pub(super) fn of(with: &ElasticUpdate, Lame { mu, lambda }: Lame) -> Self {
         let (scale, rotates) = (with.scale as f32, with.law.rotates());
-        Self { mu: mu as f32, lambda: lambda as f32, scale, rotates }
+        Self { mu: mu as f32, lambda: lambda as f32, scale, rotates, twists: None, damping: 0.0 }
     }
 }
 

@@ -5,10 +5,12 @@
 
 use scindo_matter::element::{Batched, Ids, LANES, Lanes, Simd, Vector8, prefetch, prefetch_at};
 
-use super::tet_batch::{Batch, Coefficients, EnergyCoefficients, Locals, RestBatch};
+use super::tet_batch::{Batch, Block6, Coefficients, EnergyCoefficients, Locals, RestBatch};
 use super::tet_lanes::{
-    Three, UpdatedTet, edges, forces, load, read, scatter_block, sum_of_outer_products, tet_edges, update_tet,
+    Found, Three, UpdatedTet, edges, forces, load, note_start, read, scatter_block, sum_of_outer_products,
+    tet_edges, twist_blocks, update_tet, update_twist,
 };
+use super::twist::{TwistBatch, TwistCoefficients, read_twist};
 use super::{Padded, strip_kernel};
 
 /// Tets that are in no strip are asked for so many turns ahead; see [`strip_kernel::AHEAD`].
@@ -24,6 +26,10 @@ pub(super) struct Batches {
     joined: Vec<bool>,
     /// λ/2μ at the last update.
     ratio: f32,
+    /// Twists of every batch, where they have once mattered.
+    twists: Vec<TwistBatch>,
+    /// Whether they matter now.
+    twisted: bool,
     /// Length of the local vectors, the waste bin included.
     n_locals: usize,
 }
@@ -37,8 +43,10 @@ impl Batches {
         let zero = Lanes::default();
         let mut live = Vec::with_capacity(rest.capacity());
         live.extend(nodes.iter().map(|&nodes| Batch { g: [[zero; 3]; 3], nodes }));
+        // Room for twists is made here, so that a step in which they begin to matter allocates nothing.
+        let twists = Vec::with_capacity(live.capacity());
         let joined = live[..n_in_strips].as_chunks().0.iter().map(strip_kernel::is_joined).collect();
-        Self { live, rest, joined, ratio: 0.0, n_locals }
+        Self { live, rest, joined, ratio: 0.0, twists, twisted: false, n_locals }
     }
 
     /// Grows to `n_batches` batches, the new ones empty, and to local numbers below `n_locals`. The last
@@ -52,6 +60,8 @@ impl Batches {
         let empty = Batch { g: [[Lanes::default(); 3]; 3], nodes: [[waste; LANES]; 4] };
         self.live.resize(n_batches, empty);
         self.rest.resize(n_batches, RestBatch::empty());
+        self.twisted = false;
+        self.twists.reserve(n_batches.saturating_sub(self.twists.len()));
         self.n_locals = n_locals;
     }
 
@@ -87,6 +97,16 @@ impl Batches {
         ([g0, g[0], g[1], g[2]], [0, 1, 2, 3].map(|a| b.nodes[a][lane]))
     }
 
+    /// Q of one lane as it goes with its gradients, if twists matter.
+    pub(super) fn twist(&self, batch: usize, lane: usize) -> Option<[f32; 6]> {
+        self.twisted.then(|| self.twists[batch].q.map(|q| q.0[lane]))
+    }
+
+    /// Whether twists matter.
+    pub(super) fn is_twisted(&self) -> bool {
+        self.twisted
+    }
+
     /// Local numbers of the four corners of one lane.
     pub(super) fn ids(&self, batch: usize, lane: usize) -> [u16; 4] {
         self.live[batch].nodes.each_ref().map(|ids| ids[lane])
@@ -104,7 +124,8 @@ impl Batches {
 
     /// Bytes that one application streams.
     pub(super) fn bytes(&self) -> usize {
-        self.live.len() * size_of::<Batch>()
+        let twist = if self.twisted { size_of::<TwistBatch>() } else { 0 };
+        self.live.len() * (size_of::<Batch>() + twist)
     }
 
     /// Asks for what [`Self::apply`] reads first.
@@ -119,24 +140,27 @@ impl Batches {
         &self.rest
     }
 
-    /// y += s K̂ x. `x` and `y` have one entry per local number and the waste bin.
-    pub(super) fn apply(&self, simd: Simd, x: &[Padded], y: &mut [Padded]) {
+    /// y += s K̂ x, `with_twists` where these matter. `x` and `y` have one entry per local number and the waste bin.
+    pub(super) fn apply(&self, simd: Simd, with_twists: bool, x: &[Padded], y: &mut [Padded]) {
         assert!(x.len() == self.n_locals && y.len() == self.n_locals);
+        let twisted = with_twists && self.twisted;
+        assert!(!twisted || self.twists.len() == self.live.len());
         match simd {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: these come from `Simd::detect` only.
-            Simd::Avx2 => unsafe { avx2::apply(self, x, y) },
+            Simd::Avx2 => unsafe { avx2::apply(self, twisted, x, y) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
-            Simd::Avx512 => unsafe { avx512::apply(self, x, y) },
-            _ => apply_all::<Lanes, 1>(self, x, y),
+            Simd::Avx512 => unsafe { avx512::apply(self, twisted, x, y) },
+            _ => apply_all::<Lanes, 1>(self, twisted, x, y),
         }
     }
 
     /// Computes rotations, internal forces, rotated gradients and diagonal blocks at the positions in
-    /// `locals`. Returns the number of pieces with det F ≤ 0.
-    pub(super) fn update(&mut self, simd: Simd, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+    /// `locals`. Twists do not count until they are [found](Self::find_twists).
+    pub(super) fn update(&mut self, simd: Simd, c: &Coefficients, locals: &mut Locals<'_>) -> Found {
         let n = self.n_locals;
+        self.twisted = false;
         self.ratio = 0.5 * c.lambda / c.mu;
         assert!(locals.x.len() == n && locals.f.len() == n && locals.blocks.len() == n);
         match simd {
@@ -148,6 +172,36 @@ impl Batches {
             Simd::Avx512 => unsafe { avx512::update(self, c, locals) },
             _ => update_all::<Lanes, 1>(self, c, locals),
         }
+    }
+
+    /// Notes the strains at the positions `x` [m], where a step starts.
+    pub(super) fn note_start(&mut self, simd: Simd, x: &[[f64; 4]]) {
+        assert!(x.len() == self.n_locals);
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: both come from `Simd::detect` only.
+            Simd::Avx2 | Simd::Avx512 => unsafe { avx2::note_start(self, x) },
+            _ => note_start_with::<Lanes>(self, x),
+        }
+    }
+
+    /// Computes the twists at the positions `x` [m], perhaps others than those of the last update. If they matter
+    /// anywhere, all of them count from now on, and their diagonal blocks are added to `to`.
+    pub(super) fn find_twists(
+        &mut self,
+        simd: Simd,
+        c: &TwistCoefficients,
+        x: &[[f64; 4]],
+        to: &mut [Block6],
+    ) {
+        assert!(x.len() == self.n_locals && to.len() == self.n_locals);
+        self.twists.resize(self.live.len(), TwistBatch::default());
+        self.twisted = match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: both come from `Simd::detect` only.
+            Simd::Avx2 | Simd::Avx512 => unsafe { avx2::find_twists(self, c, x, to) },
+            _ => find_twists_with::<Lanes>(self, c, x, to),
+        };
     }
 
     /// Elastic energy [J] at the displacements `u` [m], one per local number, with the rotations of the last
@@ -167,8 +221,9 @@ impl Batches {
 
 /// y += s K̂ x for tets that are in no strip.
 #[inline(always)]
-fn apply_with<V: Batched<N>, const N: usize>(
+fn apply_with<V: Batched<N>, const N: usize, const TWISTED: bool>(
     batches: &[[Batch; N]],
+    twists: &[[TwistBatch; N]],
     ratio: f32,
     x: &[Padded],
     y: &mut [Padded],
@@ -176,6 +231,7 @@ fn apply_with<V: Batched<N>, const N: usize>(
     let ratio = V::splat(ratio);
     for (k, b) in batches.iter().enumerate() {
         prefetch_at(batches, k + AHEAD);
+        let twist = if TWISTED { Some(read_twist(&twists[k])) } else { None };
         // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
         let u = unsafe {
             [
@@ -185,7 +241,7 @@ fn apply_with<V: Batched<N>, const N: usize>(
                 V::gather_all(x, b, |b| &b.nodes[3]),
             ]
         };
-        let f = forces(&read(b, |b| &b.g), &edges(u[0], u[1], u[2], u[3]), ratio);
+        let f = forces(&read(b, |b| &b.g), &edges(u[0], u[1], u[2], u[3]), ratio, twist);
         scatter_forces(y, b, &f);
     }
 }
@@ -203,38 +259,96 @@ fn update_with<V: Batched<N>, const N: usize>(
     rest: &mut [[RestBatch; N]],
     live: &mut [[Batch; N]],
     locals: &mut Locals<'_>,
-) -> usize {
-    let mut inverted = 0;
+    found: &mut Found,
+) {
     for (rest, live) in rest.iter_mut().zip(live) {
-        let found: UpdatedTet<V> = update_tet(c, &tet_edges(locals.x, live), rest, live);
-        inverted += found.inverted;
-        scatter_forces(locals.f, live, &found.f);
-        for batch in 0..N {
-            for k in 0..4 {
-                scatter_block(locals.blocks, &live[batch].nodes[k], &found.blocks[k], batch);
-            }
+        let tet: UpdatedTet<V> = update_tet(c, &tet_edges(locals.x, live), rest, live);
+        found.add(&tet);
+        scatter_forces(locals.f, live, &tet.f);
+        scatter_corner_blocks(locals.blocks, live, &tet.blocks);
+    }
+}
+
+/// Adds diagonal blocks of the four corners.
+#[inline(always)]
+fn scatter_corner_blocks<V: Batched<N>, const N: usize>(
+    to: &mut [Block6],
+    live: &[Batch; N],
+    blocks: &[[V; 6]; 4],
+) {
+    for batch in 0..N {
+        for k in 0..4 {
+            scatter_block(to, &live[batch].nodes[k], &blocks[k], batch);
         }
     }
-    inverted
+}
+
+#[inline(always)]
+fn note_start_with<V: Vector8>(of: &mut Batches, x: &[[f64; 4]]) {
+    for (live, rest) in of.live.as_chunks::<1>().0.iter().zip(of.rest.as_chunks_mut().0) {
+        note_start::<V>(&tet_edges(x, live), rest);
+    }
+}
+
+/// Twists of all tets at the positions `x`. If they matter anywhere, their blocks are added to `to`; returns whether.
+#[inline(always)]
+fn find_twists_with<V: Vector8>(
+    of: &mut Batches,
+    c: &TwistCoefficients,
+    x: &[[f64; 4]],
+    to: &mut [Block6],
+) -> bool {
+    let live = of.live.as_chunks::<1>().0;
+    let mut matter = 0;
+    for ((live, rest), twist) in live.iter().zip(of.rest.as_chunks().0).zip(of.twists.as_chunks_mut().0) {
+        matter |= update_twist::<V, 1>(c, &tet_edges(x, live), rest, twist);
+    }
+    if matter != 0 {
+        for (live, twist) in live.iter().zip(of.twists.as_chunks().0) {
+            scatter_corner_blocks::<V, 1>(to, live, &twist_blocks(live, twist));
+        }
+    }
+    matter != 0
+}
+
+#[inline(always)]
+fn apply_all<V: Batched<N>, const N: usize>(of: &Batches, twisted: bool, x: &[Padded], y: &mut [Padded]) {
+    match twisted {
+        true => apply_some::<V, N, true>(of, &of.twists, x, y),
+        false => apply_some::<V, N, false>(of, &[], x, y),
+    }
 }
 
 /// y += s K̂ x, as many batches at once as V holds; one that is left over alone.
 #[inline(always)]
-fn apply_all<V: Batched<N>, const N: usize>(of: &Batches, x: &[Padded], y: &mut [Padded]) {
-    let (strips, single) = of.live.split_at(strip_kernel::BATCHES * of.joined.len());
+fn apply_some<V: Batched<N>, const N: usize, const TWISTED: bool>(
+    of: &Batches,
+    twists: &[TwistBatch],
+    x: &[Padded],
+    y: &mut [Padded],
+) {
+    let n = strip_kernel::BATCHES * of.joined.len();
+    let (strips, single) = of.live.split_at(n);
     let strips: &[[Batch; strip_kernel::BATCHES]] = strips.as_chunks().0;
+    let (twists, single_twists) = twists.split_at(if TWISTED { n } else { 0 });
+    let twists: &[[TwistBatch; strip_kernel::BATCHES]] = twists.as_chunks().0;
     for (k, (strip, &joined)) in strips.iter().zip(&of.joined).enumerate() {
+        let twists: &[TwistBatch] = if TWISTED { &twists[k] } else { &[] };
         match joined {
             true => {
                 let soon = strips.get(k + strip_kernel::AHEAD).unwrap_or(strip);
-                strip_kernel::apply::<V, N>([strip, soon], of.ratio, x, y);
+                strip_kernel::apply::<V, N, TWISTED>([strip, soon], twists, of.ratio, x, y);
             }
-            false => apply_with::<V, N>(strip.as_chunks().0, of.ratio, x, y),
+            false => {
+                let (batches, twists) = (strip.as_chunks().0, twists.as_chunks().0);
+                apply_with::<V, N, TWISTED>(batches, twists, of.ratio, x, y);
+            }
         }
     }
-    let (whole, last) = single.as_chunks();
-    apply_with::<V, N>(whole, of.ratio, x, y);
-    apply_with::<V::Part, 1>(last.as_chunks().0, of.ratio, x, y);
+    let ((whole, last), (whole_twists, last_twist)) = (single.as_chunks(), single_twists.as_chunks());
+    apply_with::<V, N, TWISTED>(whole, whole_twists, of.ratio, x, y);
+    let (last, last_twist) = (last.as_chunks().0, last_twist.as_chunks().0);
+    apply_with::<V::Part, 1, TWISTED>(last, last_twist, of.ratio, x, y);
 }
 
 /// Updates them in the same way.
@@ -243,21 +357,25 @@ fn update_all<V: Batched<N>, const N: usize>(
     of: &mut Batches,
     c: &Coefficients,
     locals: &mut Locals<'_>,
-) -> usize {
+) -> Found {
     let n = strip_kernel::BATCHES * of.joined.len();
     let ((strips, single), (strips_rest, single_rest)) = (of.live.split_at_mut(n), of.rest.split_at_mut(n));
     let strips = strips.as_chunks_mut().0.iter_mut().zip(strips_rest.as_chunks_mut().0);
-    let mut inverted = 0;
+    let mut found = Found::default();
     for ((live, rest), &joined) in strips.zip(&of.joined) {
-        inverted += match joined {
-            true => strip_kernel::update::<V, N>(c, rest, live, locals),
-            false => update_with::<V, N>(c, rest.as_chunks_mut().0, live.as_chunks_mut().0, locals),
-        };
+        match joined {
+            true => strip_kernel::update::<V, N>(c, rest, live, locals, &mut found),
+            false => {
+                let (rest, live) = (rest.as_chunks_mut().0, live.as_chunks_mut().0);
+                update_with::<V, N>(c, rest, live, locals, &mut found);
+            }
+        }
     }
     let ((whole, last), (whole_rest, last_rest)) = (single.as_chunks_mut(), single_rest.as_chunks_mut());
-    inverted
-        + update_with::<V, N>(c, whole_rest, whole, locals)
-        + update_with::<V::Part, 1>(c, last_rest.as_chunks_mut().0, last.as_chunks_mut().0, locals)
+    update_with::<V, N>(c, whole_rest, whole, locals, &mut found);
+    let (last_rest, last) = (last_rest.as_chunks_mut().0, last.as_chunks_mut().0);
+    update_with::<V::Part, 1>(c, last_rest, last, locals, &mut found);
+    found
 }
 
 /// Σ w V (μ |D|² + λ/2 (R : D)²), where D = F − R, or sym(F) − I without rotations. F is I plus the gradient of
@@ -315,17 +433,35 @@ fn energy_with<V: Vector8>(c: EnergyCoefficients, rest: &[RestBatch], live: &[Ba
 mod avx2 {
     //! The same loops compiled for AVX2 and FMA.
 
-    use super::{Batch, Batches, Coefficients, EnergyCoefficients, Locals, Padded, RestBatch};
+    use super::{
+        Batch, Batches, Block6, Coefficients, EnergyCoefficients, Found, Locals, Padded, RestBatch,
+        TwistCoefficients,
+    };
     use scindo_matter::element::avx2::Register;
 
     #[target_feature(enable = "avx2,fma")]
-    pub(super) fn apply(of: &Batches, x: &[Padded], y: &mut [Padded]) {
-        super::apply_all::<Register, 1>(of, x, y);
+    pub(super) fn apply(of: &Batches, twisted: bool, x: &[Padded], y: &mut [Padded]) {
+        super::apply_all::<Register, 1>(of, twisted, x, y);
     }
 
     #[target_feature(enable = "avx2,fma")]
-    pub(super) fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+    pub(super) fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> Found {
         super::update_all::<Register, 1>(of, c, locals)
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub(super) fn note_start(of: &mut Batches, x: &[[f64; 4]]) {
+        super::note_start_with::<Register>(of, x);
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub(super) fn find_twists(
+        of: &mut Batches,
+        c: &TwistCoefficients,
+        x: &[[f64; 4]],
+        to: &mut [Block6],
+    ) -> bool {
+        super::find_twists_with::<Register>(of, c, x, to)
     }
 
     #[target_feature(enable = "avx2,fma")]
@@ -338,16 +474,16 @@ mod avx2 {
 mod avx512 {
     //! The same loops for two batches at once; one that is left over takes AVX2.
 
-    use super::{Batches, Coefficients, Locals, Padded};
+    use super::{Batches, Coefficients, Found, Locals, Padded};
     use scindo_matter::element::avx512::Register512;
 
     #[target_feature(enable = "avx512f,avx2,fma")]
-    pub(super) fn apply(of: &Batches, x: &[Padded], y: &mut [Padded]) {
-        super::apply_all::<Register512, 2>(of, x, y);
+    pub(super) fn apply(of: &Batches, twisted: bool, x: &[Padded], y: &mut [Padded]) {
+        super::apply_all::<Register512, 2>(of, twisted, x, y);
     }
 
     #[target_feature(enable = "avx512f,avx2,fma")]
-    pub(super) fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+    pub(super) fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> Found {
         super::update_all::<Register512, 2>(of, c, locals)
     }
 }

@@ -21,6 +21,7 @@ pub mod rows;
 mod system;
 mod tet_batch;
 mod tet_lanes;
+mod twist;
 
 pub use composite_diagonal::CompositeDiagonal;
 pub use elastic::Elastic;
@@ -29,7 +30,9 @@ pub use precondition::{Iterate, Preconditioner};
 pub use preconditioner::BlockJacobi;
 pub use rows::Sum;
 pub use stiff_modes::{NearPiece, StiffModes, degenerate_elements};
-pub use stiffness::{Direction, ElasticUpdate, OperatorChoice, Place, Stiffness, apply};
+pub use stiffness::{
+    Direction, ElasticUpdate, OperatorChoice, Place, Stiffness, Tension, apply, apply_damping,
+};
 pub use substitution::{Substitutable, Substitution};
 pub use system::{Spring, SystemOperator, filter, filter_block};
 pub use tet_batch::Block6;

@@ -35,6 +35,30 @@ pub struct ElasticUpdate {
     pub scale: f64,
 }
 
+/// Where a step starts, see [`Stiffness::update`]: the state whose tension stiffens the material, and damping.
+#[derive(Clone, Copy, Debug)]
+pub struct Tension<'a> {
+    /// Positions [m] whose tension counts, one per copy: those at the start of a step, or those that a solve before led to.
+    pub at: &'a [Vector3<f64>],
+    /// Positions [m] at the start of the step.
+    pub start: &'a [Vector3<f64>],
+    /// s [s²], the factor of forces in a step: that of K̂ without damping.
+    pub s: f64,
+    /// Density [kg/m³] of the body's own material; 0 without inertia.
+    pub density_kg_m3: f64,
+    /// β/h, if the forces are to contain those of damping, β times the rate of strain (ε − ε_start)/h; 0 if they come from
+    /// [`Stiffness::multiply_damping`]. Strains know rotations of any size: spinning material is not damped at all, while
+    /// the product of K̂ with velocities takes the arc of a turn for an expansion.
+    pub damping: f64,
+}
+
+/// Positions [m] of an update, one per copy, and what counts beside them.
+#[derive(Clone, Copy)]
+pub(super) struct UpdateAt<'a> {
+    pub positions: &'a [Vector3<f64>],
+    pub tension: Option<&'a Tension<'a>>,
+}
+
 /// Where a stiffness keeps a piece; valid until the next cut. Only the stiffness that gave a place interprets
 /// its numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -65,9 +89,16 @@ pub struct Direction<'a> {
 /// Everything is computed in two halves, each a pass over all threads: first sums of the elements, then what
 /// the copies gather of them, in blocks of [`BLOCK`] copies.
 pub trait Stiffness: Any + Debug + Send + Sync {
-    /// First half of an update at `positions` [m], one per copy: rotations, forces and diagonal blocks.
+    /// First half of an update at `positions` [m], one per copy: rotations, forces and diagonal blocks. Under `tension`,
+    /// K̂ contains the twists of the law where they matter to a step.
     /// Returns the number of inverted elements.
-    fn update(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> usize;
+    fn update(
+        &mut self,
+        team: &mut Team,
+        with: &ElasticUpdate,
+        positions: &[Vector3<f64>],
+        tension: Option<&Tension<'_>>,
+    ) -> usize;
 
     /// Elastic energy [J] at `positions` [m] with the rotations of the last update, to single precision; `None` if
     /// this stiffness does not compute it. Where the rotations are not those of `positions`, it is slightly too
@@ -92,6 +123,11 @@ pub trait Stiffness: Any + Debug + Send + Sync {
 
     /// First half of a product with `x`.
     fn multiply(&mut self, team: &mut Team, x: &[Padded]);
+
+    /// The same with K̂ as it damps, without twists: these would slow turning material.
+    fn multiply_damping(&mut self, team: &mut Team, x: &[Padded]) {
+        self.multiply(team, x);
+    }
 
     /// The same with x ← z + β x, where x is that of the last product, which had a direction too (nothing if β = 0).
     fn multiply_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32);
@@ -127,7 +163,16 @@ pub trait Stiffness: Any + Debug + Send + Sync {
 /// y = s K̂ x.
 pub fn apply(stiffness: &mut dyn Stiffness, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
     stiffness.multiply(team, x);
-    let stiffness = &*stiffness;
+    finish(stiffness, team, y);
+}
+
+/// y = s K̂ x with K̂ as it damps.
+pub fn apply_damping(stiffness: &mut dyn Stiffness, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
+    stiffness.multiply_damping(team, x);
+    finish(stiffness, team, y);
+}
+
+fn finish(stiffness: &dyn Stiffness, team: &mut Team, y: &mut [Padded]) {
     team.for_blocks(blocks(y, BLOCK), |block, y| {
         y.fill([0.0; 4]);
         stiffness.add_products(block, y);

@@ -11,7 +11,8 @@ use scindo_matter::element::{Batched, Ids, Vector, prefetch};
 use super::Padded;
 use super::strips::{NODES, TETS};
 use super::tet_batch::{Batch, Coefficients, Locals, RestBatch};
-use super::tet_lanes::{Three, edges, forces, read, scatter_block, tet_edges, update_tet};
+use super::tet_lanes::{Found, Three, edges, forces, read, scatter_block, tet_edges, update_tet};
+use super::twist::{TwistBatch, read_twist};
 
 /// Batches of tets that two batches of strips consist of.
 pub(super) const BATCHES: usize = 2 * TETS;
@@ -27,8 +28,9 @@ pub(super) fn is_joined(batches: &[Batch; BATCHES]) -> bool {
 
 /// y += s K̂ x, as many batches of strips at once as V holds.
 #[inline(always)]
-pub(super) fn apply<V: Batched<N>, const N: usize>(
+pub(super) fn apply<V: Batched<N>, const N: usize, const TWISTED: bool>(
     [batches, soon]: [&[Batch; BATCHES]; 2],
+    twists: &[TwistBatch],
     ratio: f32,
     x: &[Padded],
     y: &mut [Padded],
@@ -37,9 +39,19 @@ pub(super) fn apply<V: Batched<N>, const N: usize>(
     let tets = first.as_chunks().0.iter().zip(second.as_chunks().0).zip(third.as_chunks().0);
     let [soon_1, soon_2, soon_3] = soon.as_chunks::<2>().0 else { return };
     let soon = soon_1.as_chunks().0.iter().zip(soon_2.as_chunks().0).zip(soon_3.as_chunks().0);
-    for (((first, second), third), ((soon_1, soon_2), soon_3)) in tets.zip(soon) {
-        apply_strips::<V, N>([first, second, third], [soon_1, soon_2, soon_3], ratio, x, y);
+    for (k, (((first, second), third), ((soon_1, soon_2), soon_3))) in tets.zip(soon).enumerate() {
+        let (tets, soon) = ([first, second, third], [soon_1, soon_2, soon_3]);
+        let twists = if TWISTED { twists_of(twists, k) } else { None };
+        apply_strips::<V, N>(tets, soon, twists, ratio, x, y);
     }
+}
+
+/// Q of the first, second and third tets in turn number `k`.
+#[inline(always)]
+fn twists_of<V: Batched<N>, const N: usize>(twists: &[TwistBatch], k: usize) -> Option<[[V; 6]; TETS]> {
+    let [first, second, third] = twists.as_chunks::<2>().0 else { return None };
+    let [first, second, third] = [&first.as_chunks().0[k], &second.as_chunks().0[k], &third.as_chunks().0[k]];
+    Some([read_twist(first), read_twist(second), read_twist(third)])
 }
 
 /// Local numbers of the copies of the strips in one batch.
@@ -53,6 +65,7 @@ fn nodes<'a>(first: &'a Batch, second: &'a Batch, third: &'a Batch) -> [&'a Ids;
 fn apply_strips<V: Batched<N>, const N: usize>(
     [first, second, third]: [&[Batch; N]; TETS],
     soon: [&[Batch; N]; TETS],
+    twists: Option<[[V; 6]; TETS]>,
     ratio: f32,
     x: &[Padded],
     y: &mut [Padded],
@@ -69,12 +82,16 @@ fn apply_strips<V: Batched<N>, const N: usize>(
             V::gather_all(x, third, |b| &b.nodes[3]),
         ]
     };
+    let (mut first_twist, mut second_twist, mut third_twist) = (None, None, None);
+    if let Some([p, q, r]) = twists {
+        (first_twist, second_twist, third_twist) = (Some(p), Some(q), Some(r));
+    }
     prefetch(soon[0]);
-    let p = forces(&read(first, |b| &b.g), &edges(u[0], u[1], u[2], u[3]), ratio);
+    let p = forces(&read(first, |b| &b.g), &edges(u[0], u[1], u[2], u[3]), ratio, first_twist);
     prefetch(soon[1]);
-    let q = forces(&read(second, |b| &b.g), &edges(u[1], u[2], u[3], u[4]), ratio);
+    let q = forces(&read(second, |b| &b.g), &edges(u[1], u[2], u[3], u[4]), ratio, second_twist);
     prefetch(soon[2]);
-    let r = forces(&read(third, |b| &b.g), &edges(u[2], u[3], u[4], u[5]), ratio);
+    let r = forces(&read(third, |b| &b.g), &edges(u[2], u[3], u[4], u[5]), ratio, third_twist);
     scatter([first, second, third], y, &joined(p, q, r));
 }
 
@@ -101,23 +118,22 @@ fn scatter<V: Batched<N>, const N: usize>(
     unsafe { V::scatter_all(y, |batch| nodes(&first[batch], &second[batch], &third[batch]), f) };
 }
 
-/// Updates them in the same way. Returns the number of pieces with det F ≤ 0.
+/// Updates them in the same way.
 #[inline(always)]
 pub(super) fn update<V: Batched<N>, const N: usize>(
     c: &Coefficients,
     rest: &mut [RestBatch; BATCHES],
     live: &mut [Batch; BATCHES],
     locals: &mut Locals<'_>,
-) -> usize {
-    let [first, second, third] = live.as_chunks_mut::<2>().0 else { return 0 };
-    let [p, q, r] = rest.as_chunks_mut::<2>().0 else { return 0 };
+    found: &mut Found,
+) {
+    let [first, second, third] = live.as_chunks_mut::<2>().0 else { return };
+    let [p, q, r] = rest.as_chunks_mut::<2>().0 else { return };
     let tets = first.as_chunks_mut().0.iter_mut().zip(second.as_chunks_mut().0).zip(third.as_chunks_mut().0);
     let rest = p.as_chunks_mut().0.iter_mut().zip(q.as_chunks_mut().0).zip(r.as_chunks_mut().0);
-    let mut inverted = 0;
     for (((first, second), third), ((p, q), r)) in tets.zip(rest) {
-        inverted += update_strips::<V, N>(c, [p, q, r], [first, second, third], locals);
+        update_strips::<V, N>(c, [p, q, r], [first, second, third], locals, found);
     }
-    inverted
 }
 
 #[inline(always)]
@@ -126,7 +142,8 @@ fn update_strips<V: Batched<N>, const N: usize>(
     [rest_1, rest_2, rest_3]: [&mut [RestBatch; N]; TETS],
     [first, second, third]: [&mut [Batch; N]; TETS],
     locals: &mut Locals<'_>,
-) -> usize {
+    found: &mut Found,
+) {
     let p = update_tet(c, &tet_edges(locals.x, first), rest_1, first);
     let q = update_tet(c, &tet_edges(locals.x, second), rest_2, second);
     let r = update_tet(c, &tet_edges(locals.x, third), rest_3, third);
@@ -138,5 +155,5 @@ fn update_strips<V: Batched<N>, const N: usize>(
             scatter_block(locals.blocks, nodes[node], &blocks[node], batch);
         }
     }
-    p.inverted + q.inverted + r.inverted
+    [p, q, r].iter().for_each(|tet| found.add(tet));
 }

@@ -3,11 +3,13 @@
 use nalgebra::{Matrix3, Vector3};
 use scindo_matter::cut::{BladeSweep, CutMesh, Piece};
 use scindo_matter::element::{Simd, deformation_gradient, piece_forces};
-use scindo_matter::material::{Lame, Law};
+use scindo_matter::material::{Corotational, Lame, Law, SignedSvd, Tangent};
 use scindo_matter::mesh::{BoxPattern, TetMesh, box_mesh};
 use scindo_matter::team::Team;
 
-use super::{Block6, Elastic, ElasticUpdate, LinearOperator, OperatorChoice, Padded, Stiffness};
+use super::{
+    BLOCK, Block6, Elastic, ElasticUpdate, LinearOperator, OperatorChoice, Padded, Stiffness, Tension,
+};
 
 const LAME: Lame = Lame { mu: 4e4, lambda: 9e4 };
 
@@ -46,6 +48,44 @@ fn updated(simd: Simd, choice: OperatorChoice, law: Law, x: &[Vector3<f64>], sca
     let with = ElasticUpdate { lame: LAME, law, scale };
     let inverted = elastic.update_all(&mut Team::new(1).unwrap(), &with, x, &mut f, &mut diagonal);
     Updated { elastic, f, diagonal, inverted }
+}
+
+/// The same under the tension of the positions `at`, whose share of the stiffness is `s` of `scale`.
+fn tense(simd: Simd, choice: OperatorChoice, [x, at]: [&[Vector3<f64>]; 2], s: f64, density: f64) -> Updated {
+    let (mesh, pieces) = mesh();
+    let n = mesh.nodes.len();
+    let mut elastic = Elastic::new(simd, &mesh, &pieces, n);
+    elastic.set_choice(choice);
+    let with = ElasticUpdate { lame: LAME, law: Law::Corotational, scale: 1e-4 };
+    let tension = Tension { at, start: at, s, density_kg_m3: density, damping: 0.0 };
+    let inverted = elastic.update(&mut Team::new(2).unwrap(), &with, x, Some(&tension));
+    let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
+    f.chunks_mut(BLOCK).enumerate().for_each(|(block, f)| elastic.forces(block, f));
+    diagonal.chunks_mut(BLOCK).enumerate().for_each(|(block, d)| elastic.diagonals(block, d));
+    Updated { elastic, f, diagonal, inverted }
+}
+
+/// A direction with an entry of its own for every copy.
+fn direction(n: usize) -> Vec<Padded> {
+    (0..n).map(|n| [(0.3 * n as f32).sin(), (1.7 * n as f32).cos(), (0.9 * n as f32).sin(), 0.0]).collect()
+}
+
+/// s Σ V (Q̂ w) × ĝ of the twists by their definition, with rotations of `x` and stretches of `at`.
+fn twists(x: &[Vector3<f64>], at: &[Vector3<f64>], u: &[Padded]) -> Vec<Vector3<f64>> {
+    let (mesh, pieces) = mesh();
+    let mut y = vec![Vector3::zeros(); x.len()];
+    for piece in &pieces {
+        let g = mesh.gradients(piece.element as usize);
+        let F = |x: &[Vector3<f64>]| deformation_gradient(&piece.copies.map(|c| x[c as usize]), &g);
+        let R = SignedSvd::new(&F(x)).rotation();
+        let Q = R * Corotational(LAME).twists(&F(at)) * R.transpose();
+        let curl = piece.copies.iter().zip(&g).map(|(&c, g)| (R * g).cross(&wide(&u[c as usize])));
+        let w: Vector3<f64> = 0.5 * curl.sum::<Vector3<f64>>();
+        for (&c, g) in piece.copies.iter().zip(&g) {
+            y[c as usize] += mesh.volume(piece.element as usize) * (Q * w).cross(&(R * g));
+        }
+    }
+    y
 }
 
 fn wide(v: &Padded) -> Vector3<f64> {
@@ -124,9 +164,7 @@ fn the_energy_agrees_with_double_precision_wherever_the_body_is() {
 fn assembled_and_matrix_free_stiffness_are_the_same_map() {
     let (mesh, _) = mesh();
     let x = deformed(&mesh, 0.6, 0.0);
-    let direction: Vec<Padded> = (0..x.len())
-        .map(|n| [(0.3 * n as f32).sin(), (1.7 * n as f32).cos(), (0.9 * n as f32).sin(), 0.0])
-        .collect();
+    let direction = direction(x.len());
     let mut team = Team::new(2).unwrap();
     for law in [Law::Corotational, Law::Linear] {
         for simd in [Simd::Baseline, Simd::detect()] {
@@ -147,11 +185,124 @@ fn assembled_and_matrix_free_stiffness_are_the_same_map() {
 }
 
 #[test]
+fn under_tension_the_stiffness_is_the_projected_tangent_of_the_law() {
+    let (mesh, pieces) = mesh();
+    let (x, law) = (deformed(&mesh, 0.2, 0.0), Corotational(LAME));
+    let u = direction(x.len());
+    let mut exact = vec![Vector3::zeros(); x.len()];
+    for piece in &pieces {
+        let g = mesh.gradients(piece.element as usize);
+        let F = deformation_gradient(&piece.copies.map(|c| x[c as usize]), &g);
+        let dF = deformation_gradient(&piece.copies.map(|c| wide(&u[c as usize])), &g);
+        let dP = law.tangent(&F, Tangent::Projected)
+            * nalgebra::SVector::<f64, 9>::from_column_slice(dF.as_slice());
+        let dP = 1e-4 * mesh.volume(piece.element as usize) * Matrix3::from_column_slice(dP.as_slice());
+        piece.copies.iter().zip(&g).for_each(|(&c, g)| exact[c as usize] += dP * g);
+    }
+    let mut y = vec![[0.0; 4]; x.len()];
+    for simd in [Simd::Baseline, Simd::detect()] {
+        for choice in [OperatorChoice::MatrixFree, OperatorChoice::Assembled] {
+            let mut elastic = tense(simd, choice, [&x, &x], 1e-4, 1e-3).elastic;
+            elastic.apply(&mut Team::new(2).unwrap(), &u, &mut y);
+            let error = largest(y.iter().zip(&exact).map(|(y, exact)| wide(y) - exact));
+            let size = largest(exact.iter().copied());
+            assert!(error < 1e-5 * size, "{simd:?} {choice:?}: {error:e} of {size:e}");
+        }
+    }
+}
+
+#[test]
+fn twists_belong_to_the_positions_of_the_tension_and_not_to_damping() {
+    let (mesh, _) = mesh();
+    let (x, at) = (deformed(&mesh, 0.2, 0.0), deformed(&mesh, 0.1, 3.0));
+    let u = direction(x.len());
+    let (s, mut team) = (0.3e-4, Team::new(2).unwrap());
+    let exact = twists(&x, &at, &u);
+    let size = largest(exact.iter().copied());
+    for simd in [Simd::Baseline, Simd::detect()] {
+        let plain = updated(simd, OperatorChoice::Auto, Law::Corotational, &x, 1e-4);
+        let found = tense(simd, OperatorChoice::Auto, [&x, &at], s, 1e-3);
+        assert_eq!((plain.f, plain.inverted), (found.f, found.inverted));
+        let (mut without, mut with, mut damping) =
+            (vec![[0.0; 4]; x.len()], vec![[0.0; 4]; x.len()], vec![[0.0; 4]; x.len()]);
+        let (mut plain, mut elastic) = (plain.elastic, found.elastic);
+        plain.apply(&mut team, &u, &mut without);
+        elastic.apply(&mut team, &u, &mut with);
+        super::apply_damping(&mut elastic, &mut team, &u, &mut damping);
+        assert_eq!(without, damping, "{simd:?}");
+        let twist = with.iter().zip(&without).map(|(a, b)| (wide(a) - wide(b)) / s);
+        let error = largest(twist.zip(&exact).map(|(found, exact)| found - exact));
+        assert!(error < 1e-4 * size, "{simd:?}: {error:e} of {size:e}");
+    }
+}
+
+#[test]
+fn forces_of_damping_are_those_of_the_rate_of_strain_and_rotations_cause_none() {
+    let (mesh, pieces) = mesh();
+    let (x, start) = (deformed(&mesh, 0.2, 0.0), deformed(&mesh, 0.1, 2.0));
+    let turn = nalgebra::Rotation3::new(Vector3::new(0.4, 1.1, -0.6));
+    let turned: Vec<Vector3<f64>> = x.iter().map(|x| turn * x).collect();
+    let strain = |F: &Matrix3<f64>| {
+        let R = SignedSvd::new(F).rotation();
+        (R, 0.5 * (R.transpose() * F + F.transpose() * R) - Matrix3::identity())
+    };
+    let mut exact = vec![Vector3::zeros(); x.len()];
+    for piece in &pieces {
+        let g = mesh.gradients(piece.element as usize);
+        let at = |x: &[Vector3<f64>]| strain(&deformation_gradient(&piece.copies.map(|c| x[c as usize]), &g));
+        let ((R, now), (_, before)) = (at(&x), at(&start));
+        let damped = now + 2.5 * (now - before);
+        let stress = 2.0 * LAME.mu * damped + LAME.lambda * damped.trace() * Matrix3::identity();
+        let parts = piece_forces(&(R * stress), &g, mesh.volume(piece.element as usize));
+        piece.copies.iter().zip(parts).for_each(|(&c, f)| exact[c as usize] += f);
+    }
+    let size = largest(exact.iter().copied());
+    for simd in [Simd::Baseline, Simd::detect()] {
+        let damped = |start: &[Vector3<f64>]| {
+            let mut elastic = Elastic::new(simd, &mesh, &pieces, x.len());
+            let with = ElasticUpdate { lame: LAME, law: Law::Corotational, scale: 1e-4 };
+            let tension = Tension { at: start, start, s: 1e-4, density_kg_m3: 1e9, damping: 2.5 };
+            elastic.update(&mut Team::new(2).unwrap(), &with, &x, Some(&tension));
+            let mut f = vec![[0.0; 4]; x.len()];
+            f.chunks_mut(BLOCK).enumerate().for_each(|(block, f)| elastic.forces(block, f));
+            f
+        };
+        let error = largest(damped(&start).iter().zip(&exact).map(|(f, exact)| wide(f) - exact));
+        assert!(error < 1e-5 * size, "{simd:?}: {error:e} of {size:e}");
+        let plain = updated(simd, OperatorChoice::Auto, Law::Corotational, &x, 1e-4).f;
+        let error = largest(damped(&turned).iter().zip(&plain).map(|(f, plain)| wide(f) - wide(plain)));
+        assert!(error < 1e-5 * size, "{simd:?}, turned: {error:e} of {size:e}");
+    }
+}
+
+#[test]
+fn a_step_too_short_for_twists_does_without_them() {
+    let (mesh, _) = mesh();
+    let x = deformed(&mesh, 0.2, 0.0);
+    let u = direction(x.len());
+    let plain = updated(Simd::detect(), OperatorChoice::Auto, Law::Corotational, &x, 1e-4);
+    let found = tense(Simd::detect(), OperatorChoice::Auto, [&x, &x], 1e-4, 1e9);
+    assert_eq!(plain.diagonal, found.diagonal);
+    let [mut y, mut same] = [vec![[0.0; 4]; x.len()], vec![[0.0; 4]; x.len()]];
+    let (mut plain, mut elastic, mut team) = (plain.elastic, found.elastic, Team::new(1).unwrap());
+    plain.apply(&mut team, &u, &mut y);
+    elastic.apply(&mut team, &u, &mut same);
+    assert_eq!(y, same);
+    assert_eq!(plain.bytes(), elastic.bytes());
+}
+
+#[test]
 fn diagonal_blocks_are_those_of_the_map() {
     let (mesh, _) = mesh();
     let x = deformed(&mesh, 0.3, 0.0);
-    let Updated { mut elastic, diagonal, .. } =
-        updated(Simd::detect(), OperatorChoice::Auto, Law::Corotational, &x, 1e-4);
+    check_diagonals(updated(Simd::detect(), OperatorChoice::Auto, Law::Corotational, &x, 1e-4), &x);
+    for simd in [Simd::Baseline, Simd::detect()] {
+        check_diagonals(tense(simd, OperatorChoice::Auto, [&x, &deformed(&mesh, 0.1, 0.0)], 1e-4, 1e-3), &x);
+    }
+}
+
+fn check_diagonals(of: Updated, x: &[Vector3<f64>]) {
+    let Updated { mut elastic, diagonal, .. } = of;
     let mut team = Team::new(1).unwrap();
     for n in [0, 17, 200] {
         for (axis, entries) in [[0, 1, 2], [1, 4, 5], [2, 5, 6]].into_iter().enumerate() {
@@ -224,27 +375,51 @@ fn a_rotation_is_remembered_where_the_gradient_defines_none() {
 /// After every cut, chunks that were amended or planned anew give the same results as new ones.
 #[test]
 fn amended_chunks_act_like_new_ones() {
-    amended_chunks_act_like_new(Law::Corotational, OperatorChoice::MatrixFree);
-    amended_chunks_act_like_new(Law::Linear, OperatorChoice::Assembled);
+    for (law, choice) in
+        [(Law::Corotational, OperatorChoice::MatrixFree), (Law::Linear, OperatorChoice::Assembled)]
+    {
+        let n_pieces = amended_chunks_act_like_new(law, choice, (1..16).map(scattered).collect());
+        assert!(n_pieces > 2 * mesh().0.tets.len(), "chunks have been planned anew");
+        // Slices from one end: one chunk after the other is planned anew while the others stay.
+        amended_chunks_act_like_new(law, choice, (1..36).map(sliced).collect());
+    }
 }
 
-fn amended_chunks_act_like_new(law: Law, choice: OperatorChoice) {
+/// Ends of the box of the mesh.
+fn corners() -> [Vector3<f64>; 2] {
+    let nodes = mesh().0.nodes;
+    [nodes.iter().fold(nodes[0], |low, x| low.inf(x)), nodes.iter().fold(nodes[0], |high, x| high.sup(x))]
+}
+
+/// A cut through the body somewhere, every second one narrow.
+fn scattered(k: u32) -> BladeSweep {
+    let [low, high] = corners();
+    let s = f64::from(k);
+    let middle = low + (high - low) * (0.5 + 0.3 * (1.3 * s).sin());
+    let normal = Vector3::new(s.sin(), (2.0 * s).cos(), (3.1 * s).sin()).normalize();
+    let u = normal.cross(&Vector3::new(0.3, -0.5, 0.8)).normalize() * (high - low).norm();
+    let w = normal.cross(&u) * if k.is_multiple_of(2) { 1.0 } else { 0.1 };
+    BladeSweep { segments: vec![[middle - u - w, middle - u + w], [middle + u - w, middle + u + w]] }
+}
+
+/// Cut number `k` of 36 across the body, from one end to the other.
+fn sliced(k: u32) -> BladeSweep {
+    let [low, high] = corners();
+    let at = |y: f64, z: f64| {
+        low + (high - low).component_mul(&Vector3::new((f64::from(k) + 0.2 * y) / 36.0, y, z))
+    };
+    BladeSweep { segments: vec![[at(-0.1, -0.1), at(-0.1, 1.1)], [at(1.1, -0.1), at(1.1, 1.1)]] }
+}
+
+/// Returns the number of pieces after these cuts.
+fn amended_chunks_act_like_new(law: Law, choice: OperatorChoice, blades: Vec<BladeSweep>) -> usize {
     let (mesh, _) = mesh();
     let mut cut = CutMesh::new(mesh.clone()).unwrap();
     let mut amended = Elastic::new(Simd::detect(), &mesh, cut.pieces(), cut.n_copies());
     amended.set_choice(choice);
     let mut team = Team::new(1).unwrap();
     let with = ElasticUpdate { lame: LAME, law, scale: 1e-4 };
-    let (low, high) =
-        mesh.nodes.iter().fold((mesh.nodes[0], mesh.nodes[0]), |(low, high), x| (low.inf(x), high.sup(x)));
-    for k in 1..16_u32 {
-        let s = f64::from(k);
-        let middle = low + (high - low) * (0.5 + 0.3 * (1.3 * s).sin());
-        let normal = Vector3::new(s.sin(), (2.0 * s).cos(), (3.1 * s).sin()).normalize();
-        let u = normal.cross(&Vector3::new(0.3, -0.5, 0.8)).normalize() * (high - low).norm();
-        let w = normal.cross(&u) * if k % 2 == 0 { 1.0 } else { 0.1 };
-        let blade =
-            BladeSweep { segments: vec![[middle - u - w, middle - u + w], [middle + u - w, middle + u + w]] };
+    for (k, blade) in (1..).zip(blades) {
         cut.sweep(&cut.rest_positions(), &blade, k).unwrap();
         let (pieces, n) = (cut.pieces(), cut.n_copies());
         amended.follow(&mesh, pieces, cut.changed_pieces(), n);
@@ -274,7 +449,7 @@ fn amended_chunks_act_like_new(law: Law, choice: OperatorChoice) {
         let same = |(a, b): (&Block6, &Block6)| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5 * size);
         assert!(diagonal.iter().zip(&other.3).all(same), "after cut {k}");
     }
-    assert!(cut.pieces().len() > 2 * mesh.tets.len(), "chunks have been planned anew");
+    cut.pieces().len()
 }
 
 /// A mesh with one element for every piece, so that no two pieces go together, and its pieces.

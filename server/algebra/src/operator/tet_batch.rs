@@ -7,6 +7,7 @@ use scindo_matter::mesh::TetMesh;
 use super::Padded;
 use super::shared_lanes::Merged;
 use super::strips::Corners;
+use super::twist::TwistCoefficients;
 
 /// Symmetric 3×3 block (xx, xy, xz, 0, yy, yz, zz, 0): the sum of s K̂ over the pieces around a copy.
 pub type Block6 = [f32; 8];
@@ -30,8 +31,12 @@ pub(super) struct RestBatch {
     pub g: [[Lanes; 3]; 3],
     /// w V [m³]; 0 in unused lanes.
     pub volume: Lanes,
+    /// Largest |g|² of the four corners [1/m²].
+    pub sharp: Lanes,
     /// Rotation R of the last update, also the warm start of the next.
     pub rotation: Mat3<Lanes>,
+    /// Strain ε where a step starts (xx, xy, xz, yy, yz, zz), for damping.
+    pub start: [Lanes; 6],
     /// Number of pieces that each lane integrates.
     pub pieces: [u32; LANES],
 }
@@ -43,7 +48,14 @@ impl RestBatch {
         for i in 0..3 {
             rotation[4 * i] = Lanes([1.0; LANES]);
         }
-        Self { g: Default::default(), volume: Lanes::default(), rotation, pieces: [0; LANES] }
+        Self {
+            g: Default::default(),
+            volume: Lanes::default(),
+            sharp: Lanes::default(),
+            rotation,
+            start: Default::default(),
+            pieces: [0; LANES],
+        }
     }
 
     /// Fills a lane: gradients in the order `corners`, volume, and the rotation if that is known.
@@ -60,6 +72,7 @@ impl RestBatch {
                 self.g[k][i].0[lane] = g[corners[k + 1] as usize][i] as f32;
             }
         }
+        self.sharp.0[lane] = g.iter().map(|g| g.norm_squared()).fold(0.0, f64::max) as f32;
         self.set_volume(lane, mesh, merged);
         if let Some(R) = rotation {
             for i in 0..9 {
@@ -87,6 +100,10 @@ pub(super) struct Coefficients {
     pub scale: f32,
     /// Whether pieces rotate (corotational) or keep R = I (linear).
     pub rotates: bool,
+    /// Constants of twists, where these may be needed.
+    pub twists: Option<TwistCoefficients>,
+    /// β/h, if forces contain those of damping: β times the change of strain since the start of the step, over h.
+    pub damping: f32,
 }
 
 /// Constants of an energy.

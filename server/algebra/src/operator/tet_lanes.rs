@@ -15,6 +15,7 @@ use scindo_matter::element::{
 };
 
 use super::tet_batch::{Batch, Block6, Coefficients, RestBatch};
+use super::twist::{self, TwistBatch, TwistCoefficients, read_twist};
 
 /// Three numbers per lane.
 pub(super) type Three<V> = [V; 3];
@@ -79,9 +80,15 @@ pub(super) fn edges<V: Vector>(from: Three<V>, a: Three<V>, b: Three<V>, c: Thre
     d
 }
 
-/// Forces σ g′_k on the corners k = 1, 2, 3, and on corner 0, of tets with the edges `d` from corner 0.
+/// Forces σ g′_k on the corners k = 1, 2, 3, and on corner 0, of tets with the edges `d` from corner 0, and perhaps with
+/// [twists](super::twist): σ = sym H + λ/2μ tr(H) I + [Q w]×.
 #[inline(always)]
-pub(super) fn forces<V: Vector>(g: &[Three<V>; 3], d: &[Three<V>; 3], ratio: V) -> [Three<V>; 4] {
+pub(super) fn forces<V: Vector>(
+    g: &[Three<V>; 3],
+    d: &[Three<V>; 3],
+    ratio: V,
+    twists: Option<[V; 6]>,
+) -> [Three<V>; 4] {
     let half = V::splat(0.5);
     let H = sum_of_outer_products(d, g);
     let pressure = ratio * (H[0][0] + H[1][1] + H[2][2]);
@@ -89,7 +96,12 @@ pub(super) fn forces<V: Vector>(g: &[Three<V>; 3], d: &[Three<V>; 3], ratio: V) 
     let sxy = half * (H[0][1] + H[1][0]);
     let sxz = half * (H[0][2] + H[2][0]);
     let syz = half * (H[1][2] + H[2][1]);
-    let sigma = [[sxx, sxy, sxz], [sxy, syy, syz], [sxz, syz, szz]];
+    let mut sigma = [[sxx, sxy, sxz], [sxy, syy, syz], [sxz, syz, szz]];
+    if let Some(Q) = twists {
+        let w = [half * (H[2][1] - H[1][2]), half * (H[0][2] - H[2][0]), half * (H[1][0] - H[0][1])];
+        let [x, y, z] = twist::times(&Q, &w);
+        sigma = [[sxx, sxy - z, sxz + y], [sxy + z, syy, syz - x], [sxz - y, syz + x, szz]];
+    }
     let f = [product(&sigma, &g[0]), product(&sigma, &g[1]), product(&sigma, &g[2])];
     [minus_sum(&f), f[0], f[1], f[2]]
 }
@@ -103,6 +115,26 @@ pub(super) struct UpdatedTet<V> {
     pub blocks: [[V; 6]; 4],
     /// Number of pieces with det F ≤ 0.
     pub inverted: usize,
+    /// Lanes so stretched that their twists may matter.
+    pub pulled: u16,
+}
+
+/// What an update finds.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Found {
+    /// Pieces with det F ≤ 0.
+    pub inverted: usize,
+    /// Whether some are so stretched that twists may matter.
+    pub pulled: bool,
+}
+
+impl Found {
+    /// Adds what was found in one tet per lane.
+    #[inline(always)]
+    pub(super) fn add<V>(&mut self, tet: &UpdatedTet<V>) {
+        self.inverted += tet.inverted;
+        self.pulled |= tet.pulled != 0;
+    }
 }
 
 /// Updates rotations and rotated gradients of tets with the edges `e` from corner 0.
@@ -118,14 +150,24 @@ pub(super) fn update_tet<V: Batched<N>, const N: usize>(
     let F = sum_of_outer_products(e, &g);
     // The linear law keeps R = I.
     let inverted = if c.rotates { rotate(&F, rest) } else { 0 };
-    let mut R = g;
-    for i in 0..3 {
-        for j in 0..3 {
-            R[i][j] = V::read(rest, |rest| &rest.rotation[3 * i + j]);
+    let R = rotation(rest);
+    let two_mu_volume = V::splat(2.0 * c.mu) * V::read(rest, |rest| &rest.volume);
+    let mut strain = biot_strain(&F, &R);
+    let pulled = match &c.twists {
+        Some(twists) => {
+            let sharp = V::read(rest, |rest| &rest.sharp);
+            twists.matters(twists.bound(&strain), V::splat(1.0), sharp)
+        }
+        None => 0,
+    };
+    if c.damping > 0.0 {
+        let rate = V::splat(c.damping);
+        for i in 0..6 {
+            let start = V::read(rest, |rest| &rest.start[i]);
+            strain[i] = rate.mul_add(strain[i] - start, strain[i]);
         }
     }
-    let two_mu_volume = V::splat(2.0 * c.mu) * V::read(rest, |rest| &rest.volume);
-    let P = piola_stress(&F, &R, two_mu_volume, ratio);
+    let P = piola_stress(&strain, &R, two_mu_volume, ratio);
     let f = [product(&P, &g[0]), product(&P, &g[1]), product(&P, &g[2])];
     // R and √(2μ w V s) go into the gradients here, so that an application needs neither.
     let root = (two_mu_volume * V::splat(c.scale)).sqrt();
@@ -142,7 +184,55 @@ pub(super) fn update_tet<V: Batched<N>, const N: usize>(
         block(&turned[1], ratio),
         block(&turned[2], ratio),
     ];
-    UpdatedTet { f: [minus_sum(&f), f[0], f[1], f[2]], blocks, inverted }
+    UpdatedTet { f: [minus_sum(&f), f[0], f[1], f[2]], blocks, inverted, pulled }
+}
+
+/// Writes Q of tets with the edges `e` from corner 0 at the positions that twists belong to, turned by the rotations of
+/// the last update. Returns the lanes in which it matters.
+#[inline(always)]
+pub(super) fn update_twist<V: Batched<N>, const N: usize>(
+    c: &TwistCoefficients,
+    e: &[Three<V>; 3],
+    rest: &[RestBatch; N],
+    to: &mut [TwistBatch; N],
+) -> u16 {
+    let g: [Three<V>; 3] = read(rest, |rest| &rest.g);
+    let (Q, most) = twist::twist(&sum_of_outer_products(e, &g), c);
+    let Q = twist::turned(&Q, &rotation(rest));
+    let factor = V::splat(c.factor());
+    for i in 0..6 {
+        (factor * Q[i]).write(to, |to| &mut to.q[i]);
+    }
+    let one = V::splat(1.0);
+    c.matters(most, one, V::read(rest, |rest| &rest.sharp))
+}
+
+/// Diagonal blocks of the twists of the four corners.
+#[inline(always)]
+pub(super) fn twist_blocks<V: Batched<N>, const N: usize>(
+    live: &[Batch; N],
+    twists: &[TwistBatch; N],
+) -> [[V; 6]; 4] {
+    let g: [Three<V>; 3] = read(live, |b| &b.g);
+    let Q = read_twist(twists);
+    [
+        twist::block(&Q, &minus_sum(&g)),
+        twist::block(&Q, &g[0]),
+        twist::block(&Q, &g[1]),
+        twist::block(&Q, &g[2]),
+    ]
+}
+
+/// R of every batch.
+#[inline(always)]
+fn rotation<V: Batched<N>, const N: usize>(rest: &[RestBatch; N]) -> [Three<V>; 3] {
+    let mut R = [[V::splat(0.0); 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            R[i][j] = V::read(rest, |rest| &rest.rotation[3 * i + j]);
+        }
+    }
+    R
 }
 
 /// ½ (|g|² I + g gᵀ) + λ/2μ g gᵀ, the diagonal block of one copy; g contains √(2μ w V s).
@@ -160,6 +250,19 @@ fn block<V: Vector>(g: &Three<V>, ratio: V) -> [V; 6] {
         t[1] * g[2],
         t[2].mul_add(g[2], isotropic),
     ]
+}
+
+/// Notes the strain of tets with the edges `e` from corner 0.
+#[inline(always)]
+pub(super) fn note_start<V: Vector8>(e: &[Three<V>; 3], rest: &mut [RestBatch; 1]) {
+    let F = sum_of_outer_products(e, &read(rest, |rest| &rest.g));
+    let held = rest[0].rotation;
+    rotate(&F, rest);
+    let strain = biot_strain(&F, &rotation(rest));
+    rest[0].rotation = held;
+    for i in 0..6 {
+        rest[0].start[i] = strain[i].store();
+    }
 }
 
 /// Updates the rotation of every used lane; returns how many have det F ≤ 0.
@@ -207,9 +310,9 @@ fn rotate_guarded(F: &Mat3<Lanes>, R: &Mat3<Lanes>, trusted: u16, rest: &mut Res
     inverted
 }
 
-/// w V P = w V R (2μ ε + λ tr(ε) I), ε = sym(RᵀF) − I.
+/// ε = sym(RᵀF) − I, as (xx, xy, xz, yy, yz, zz).
 #[inline(always)]
-fn piola_stress<V: Vector>(F: &[[V; 3]; 3], R: &[[V; 3]; 3], two_mu_volume: V, ratio: V) -> [[V; 3]; 3] {
+fn biot_strain<V: Vector>(F: &[[V; 3]; 3], R: &[[V; 3]; 3]) -> [V; 6] {
     // RᵀF column by column
     let mut S = *F;
     for i in 0..3 {
@@ -218,15 +321,18 @@ fn piola_stress<V: Vector>(F: &[[V; 3]; 3], R: &[[V; 3]; 3], two_mu_volume: V, r
         }
     }
     let (one, half) = (V::splat(1.0), V::splat(0.5));
-    let (exx, eyy, ezz) = (S[0][0] - one, S[1][1] - one, S[2][2] - one);
-    let pressure = ratio * (exx + eyy + ezz);
-    let shear = half * two_mu_volume;
-    let sxy = shear * (S[0][1] + S[1][0]);
-    let sxz = shear * (S[0][2] + S[2][0]);
-    let syz = shear * (S[1][2] + S[2][1]);
-    let sxx = two_mu_volume * (exx + pressure);
-    let syy = two_mu_volume * (eyy + pressure);
-    let szz = two_mu_volume * (ezz + pressure);
+    let (xy, xz, yz) = (S[0][1] + S[1][0], S[0][2] + S[2][0], S[1][2] + S[2][1]);
+    [S[0][0] - one, half * xy, half * xz, S[1][1] - one, half * yz, S[2][2] - one]
+}
+
+/// w V P = w V R (2μ ε + λ tr(ε) I).
+#[inline(always)]
+fn piola_stress<V: Vector>(strain: &[V; 6], R: &[[V; 3]; 3], two_mu_volume: V, ratio: V) -> [[V; 3]; 3] {
+    let [xx, xy, xz, yy, yz, zz] = *strain;
+    let pressure = ratio * (xx + yy + zz);
+    let (sxx, syy, szz) =
+        (two_mu_volume * (xx + pressure), two_mu_volume * (yy + pressure), two_mu_volume * (zz + pressure));
+    let (sxy, sxz, syz) = (two_mu_volume * xy, two_mu_volume * xz, two_mu_volume * yz);
     let sigma = [[sxx, sxy, sxz], [sxy, syy, syz], [sxz, syz, szz]]; // symmetric: rows are columns
     let mut P = sigma;
     for i in 0..3 {

@@ -13,8 +13,8 @@ use std::arch::x86_64::{
     _mm512_broadcast_f64x4, _mm512_castpd_ps, _mm512_castps_pd, _mm512_castps_si512, _mm512_castps128_ps512,
     _mm512_castps256_ps512, _mm512_castps512_ps128, _mm512_castps512_ps256, _mm512_castsi512_ps,
     _mm512_cmp_ps_mask, _mm512_div_ps, _mm512_extractf32x4_ps, _mm512_extractf64x4_pd, _mm512_fmadd_ps,
-    _mm512_insertf32x4, _mm512_insertf64x4, _mm512_mask_blend_ps, _mm512_mul_ps, _mm512_set1_ps,
-    _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_sqrt_ps, _mm512_sub_ps, _mm512_unpackhi_ps,
+    _mm512_insertf32x4, _mm512_insertf64x4, _mm512_mask_blend_ps, _mm512_max_ps, _mm512_mul_ps,
+    _mm512_set1_ps, _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_sqrt_ps, _mm512_sub_ps, _mm512_unpackhi_ps,
     _mm512_unpacklo_ps, _mm512_xor_si512,
 };
 use std::ops::{Add, Mul, Neg, Sub};
@@ -82,6 +82,12 @@ impl Vector for Register512 {
     fn sqrt(self) -> Self {
         // SAFETY: only reached from functions that enable AVX-512.
         Self(unsafe { _mm512_sqrt_ps(self.0) })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: only reached from functions that enable AVX-512.
+        Self(unsafe { _mm512_max_ps(self.0, other.0) })
     }
 
     #[inline(always)]

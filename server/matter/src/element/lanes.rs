@@ -99,6 +99,8 @@ pub trait Vector:
     fn recip(self) -> Self;
     /// √self.
     fn sqrt(self) -> Self;
+    /// The larger one of both; `other` where one is NaN.
+    fn max(self, other: Self) -> Self;
     /// One bit per lane, lane 0 lowest: set if the lane is above `threshold`. It is not set for NaN.
     fn above(self, threshold: f32) -> u16;
     /// The lanes of the first batch from `self`, and of the second, if there is one, from `other`.
@@ -252,6 +254,11 @@ impl Vector for Lanes {
     #[inline(always)]
     fn sqrt(self) -> Self {
         Self(self.0.map(f32::sqrt))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(std::array::from_fn(|l| if self.0[l] > other.0[l] { self.0[l] } else { other.0[l] }))
     }
 
     #[inline(always)]

@@ -8,6 +8,7 @@ pub mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub mod avx512;
 mod polar_lanes;
+mod eigen_lanes;
 mod tet4;
 pub mod quadrature;
 pub mod tet10;
@@ -21,6 +22,7 @@ mod held;
 mod material_point;
 
 pub use crate::for_eight;
+pub use eigen_lanes::symmetric_eigen;
 pub use held::{FixedCopy, Held};
 pub use kinds::ElementKind;
 pub use lanes::{Batched, Halves, Ids, LANES, Lanes, Simd, Vector, Vector8};

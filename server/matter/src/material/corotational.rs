@@ -23,6 +23,9 @@ pub struct Corotational(
 const LEAST_SUM: f64 = 1e-6;
 
 impl Corotational {
+    /// Least σ_i + σ_j in [`twists`](Self::twists): in flat material under tension λ_k would grow beyond all bounds.
+    pub const LEAST_STRETCHES: f64 = 0.1;
+
     /// ψ = μ ‖F − R‖² + λ/2 tr²(RᵀF − I) [J/m³].
     pub fn energy(&self, F: &Matrix3<f64>) -> f64 {
         self.energy_and_stress(F).0
@@ -53,6 +56,21 @@ impl Corotational {
             Tangent::Held => principal.twist = Vector3::zeros(),
         }
         principal.hessian(&svd)
+    }
+
+    /// Q = Σ λ_k v_k v_kᵀ [Pa] in the frame of the material, over the axes v_k of the stretch: what tension adds to the
+    /// tangent `Held` for turns of the material against its rotation. With half the curl w of a displacement in the frame
+    /// of R, that is the energy wᵀ Q w per volume. λ_k = (T_i + T_j)/(σ_i + σ_j) with the principal stresses T of Biot;
+    /// negative ones, of compression, are left out.
+    pub fn twists(&self, F: &Matrix3<f64>) -> Matrix3<f64> {
+        let Lame { mu, lambda } = self.0;
+        let SignedSvd { sigma, V, .. } = SignedSvd::new(F);
+        let pressure = lambda * (sigma.sum() - 3.0);
+        let eigenvalue = Vector3::from_fn(|k, _| {
+            let sum = sigma[(k + 1) % 3] + sigma[(k + 2) % 3];
+            (2.0 * (mu * (sum - 2.0) + pressure)).max(0.0) / sum.max(Self::LEAST_STRETCHES)
+        });
+        V * Matrix3::from_diagonal(&eigenvalue) * V.transpose()
     }
 
     /// ψ = μ Σ (σ_i − 1)² + λ/2 (Σ σ_i − 3)² as a function of its stretches.
@@ -118,6 +136,28 @@ mod tests {
                     "{found} {expected} at {F}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn held_tangent_and_twists_are_the_projected_one() {
+        for F in samples() {
+            let svd = SignedSvd::new(&F);
+            // The flattest samples are beyond the bound of twists.
+            if svd.sigma.sum() - svd.sigma.amax() < Corotational::LEAST_STRETCHES {
+                continue;
+            }
+            let (R, Q) = (svd.rotation(), LAW.twists(&F));
+            let dF = Matrix3::new(0.3, 0.1, 0.2, -0.6, -0.4, 0.5, 0.9, 0.5, 0.1);
+            let H = R.transpose() * dF;
+            let skew = 0.5 * (H - H.transpose());
+            let w = Vector3::new(skew[(2, 1)], skew[(0, 2)], skew[(1, 0)]);
+            let d = nalgebra::SVector::<f64, 9>::from_column_slice(dF.as_slice());
+            let held = LAW.tangent(&F, Tangent::Held) * d;
+            let twists = R * (Q * w).cross_matrix();
+            let found = held + nalgebra::SVector::<f64, 9>::from_column_slice(twists.as_slice());
+            let projected = LAW.tangent(&F, Tangent::Projected) * d;
+            assert!((found - projected).norm() < 1e-9 * (1.0 + projected.norm()), "{F}");
         }
     }
 

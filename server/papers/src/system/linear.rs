@@ -178,7 +178,7 @@ impl System {
     fn bring_up_to_date(&mut self) {
         let [mass_factor, scale] = self.factors;
         let with = ElasticUpdate { lame: self.material.lame(), law: Law::Corotational, scale };
-        self.stiffness.update(&mut self.team, &with, &self.rest);
+        self.stiffness.update(&mut self.team, &with, &self.rest, None);
         self.diagonal.resize(self.rest.len(), [0.0; 8]);
         let (K, mass) = (&self.stiffness, &self.mass_f32);
         self.team.for_blocks(blocks(&mut self.diagonal, BLOCK), |block, diagonal| {

@@ -1,6 +1,5 @@
 //! One body: what the world holds, steps, cuts, loads and measures.
 
-mod ablation;
 mod adapting;
 mod boundary;
 mod cost;
@@ -25,7 +24,7 @@ mod undo;
 mod viscoelastic;
 
 #[doc(hidden)]
-pub use ablation::Ablation;
+pub use crate::integrator::Ablation;
 pub use adapting::AdaptReport;
 pub use boundary::FixedNode;
 pub use error::BodyError;
@@ -556,8 +555,6 @@ fn step_solver(
         return Ok(Box::new(ModelSolver::of_space(space, *material, of_model, dynamics)?));
     };
     stiffness.set_choice(settings.operator(law, space.n_pieces()));
-    let (solver, ablation) = (settings.step_solver(law), settings.ablation);
-    let ablated = (ablation.predictor, ablation.lagged_friction);
-    let stiffness = (stiffness, settings.simd);
-    Ok(Box::new(LinearlyImplicit::new((scheme, *material), solver, stiffness, ablated)))
+    let (solver, stiffness) = (settings.step_solver(law), (stiffness, settings.simd));
+    Ok(Box::new(LinearlyImplicit::new((scheme, *material), solver, stiffness, settings.ablation)))
 }

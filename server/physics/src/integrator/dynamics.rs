@@ -14,6 +14,7 @@ use scindo_matter::storage::reserve::resize_reserving;
 use scindo_matter::team::Team;
 
 use super::active_springs::make_room;
+use super::balance::Balance;
 use super::course::Course;
 use super::free_motion::{FreeMotion, free_motions};
 use super::model_solver::ModelSolver;
@@ -97,12 +98,13 @@ impl Dynamics {
     pub fn set_material(&mut self, material: Material) {
         self.solver.set_material(material);
         self.course.multistep.forces_jump();
-        self.course.multistep.forget_energy();
+        self.course.forget_energy();
     }
 
     /// Forgets earlier steps. The integrator calls it itself if a state is not the one it left.
     pub fn restart(&mut self) {
         self.course.multistep.forget();
+        self.course.balance.forget();
         self.solver.restart();
     }
 
@@ -110,6 +112,7 @@ impl Dynamics {
     /// stays. The energy balance starts anew without that of the stopped copies.
     pub fn still(&mut self, copies: &[u32], state: &State) {
         self.course.multistep.still(copies, state);
+        self.course.balance.forget();
     }
 
     /// Follows the last cut of `space`, which made the copies `new`. All material keeps its history.
@@ -120,12 +123,14 @@ impl Dynamics {
         new: &[NewCopy],
     ) -> Result<(), ModelError> {
         self.course.multistep.inherit(new);
+        self.course.balance.forget();
         self.solver.follow_cut(team, space)
     }
 
     /// Carries the history over a change of the elements; [`follow_elements`](Self::follow_elements) ends it.
     pub fn adapt(&mut self, change: Adapted<'_>) {
         self.course.multistep.adapt(change);
+        self.course.balance.forget();
     }
 
     /// Follows the elements of `space` after all of them have [changed](Self::adapt).
@@ -141,6 +146,7 @@ impl Dynamics {
     /// Starts anew from `space` as it is now.
     pub fn rebuild(&mut self, space: &dyn Space) -> Result<(), ModelError> {
         self.course.multistep.forget();
+        self.course.balance = Balance::default();
         self.solver.rebuild(space)
     }
 
@@ -211,12 +217,13 @@ impl Dynamics {
         }
         if report.outcome == Outcome::Advanced {
             self.course.multistep.push((&self.course.before, state), inputs, report.scheme);
+            self.balance(team, state, inputs, &mut report);
             return report;
         }
         state.copy_from(&self.course.before);
         self.solver.follow_viscous(team, state);
         spring_forces.fill(Vector3::zeros());
-        self.course.multistep.forget_energy();
+        self.course.forget_energy();
         if report.outcome == Outcome::Held {
             state.v.fill(Vector3::zeros());
             report.notice = Some(Notice::NotFinite);
@@ -265,7 +272,7 @@ impl Dynamics {
         }
         self.solver.carry_weightless(state, inputs);
         self.course.multistep.push((&self.course.before, state), inputs, Scheme::ImplicitEuler);
-        self.course.multistep.forget_energy();
+        self.course.forget_energy();
     }
 
     /// Makes the step with the scheme of the body, or with implicit Euler where a guard demands it.
@@ -285,6 +292,7 @@ impl Dynamics {
             self.solver.accelerate(team, state, inputs, multistep.acceleration_mut());
         }
         let before_j = self.begin_energy(team, state, inputs);
+        self.solver.be_careful(self.course.balance.is_careful());
         self.attempt(team, state, (scheme, inputs), report, spring_forces);
         // A step that was made in parts was made with implicit Euler.
         let (made_with, iterations) = (report.scheme, report.iterations);
@@ -355,6 +363,25 @@ impl Dynamics {
         let driven = inputs.is_driven(before);
         let end = (H, elastic_j, before_j + exchanged.abs() + pressed.abs());
         multistep.end_energy(end, report.scheme, (driven, may_repeat))
+    }
+
+    /// Judges by energy whether steps by linear solves solve their equations.
+    fn balance(&mut self, team: &mut Team, state: &State, inputs: &StepInputs<'_>, report: &mut SolveReport) {
+        let Self { course: Course { balance, before, .. }, solver, scheme, .. } = self;
+        if solver.model().is_some() || !scheme.is_implicit_motion() {
+            return;
+        }
+        // What moves prescribed nodes does work that is not known here.
+        if inputs.is_driven(before) {
+            return balance.forget();
+        }
+        let energies = || {
+            [solver.elastic_energy(team, state, inputs.points), solver.kinetic_energy(inputs.mass, &state.v)]
+        };
+        let careful = balance.is_careful();
+        if let Some(excess_j) = balance.book(report.internal_work_j, energies) {
+            report.notice = Some(Notice::Unbalanced { excess_j, careful });
+        }
     }
 
     /// Follows a change of the prescribed directions.

@@ -35,7 +35,7 @@ const SAME_GRIP: f64 = 1e-3;
 
 /// Φ of the step whose history is `$history`.
 macro_rules! step_potential {
-    ($solver:ident, ($inputs:ident, $history:ident), $definite:ident) => {{
+    ($solver:ident, ($inputs:ident, $history:ident, $before:ident), $definite:ident) => {{
         let StepHistory { increment, x_a, x_v } = *$history;
         let Rayleigh { mass_1_s: alpha, stiffness_s: beta } = $solver.material.rayleigh;
         StepPotential {
@@ -46,6 +46,8 @@ macro_rules! step_potential {
             x_v,
             alpha,
             damping: $solver.damping.as_ref().filter(|_| increment.B > 0.0).map(|K| (beta, K)),
+            turned: &$solver.turned,
+            tension: (increment.A > 0.0).then_some(&$before.x[..]),
             f_ext: &$solver.f_ext,
             springs: &$solver.active.springs,
             pressure: ($inputs.pressure, &mut $solver.follower),
@@ -87,6 +89,11 @@ impl ModelSolver {
         let increment = history.increment;
         if let (true, Some(K)) = (increment.B > 0.0, &mut self.damping) {
             self.model.rotated_stiffness(&state.x, K);
+            self.turned.fill(Vector3::zeros());
+            // In other schemes the expansions of a steady turn cancel.
+            if scheme == Scheme::ImplicitEuler {
+                self.model.add_turned_strain(&state.x, &before.x, &mut self.turned);
+            }
         }
         let newton = self.minimise(team, (before, &mut state.x), (inputs, &history), report);
         team.begin(Phase::Commit);
@@ -160,7 +167,7 @@ impl ModelSolver {
         }
         let definite = if single { Tangent::Held } else { Tangent::Projected };
         self.follower.begin(inputs.pressure, x);
-        let mut phi = step_potential!(self, (inputs, history), definite);
+        let mut phi = step_potential!(self, (inputs, history, before), definite);
         team.begin(Phase::Residual);
         if !phi.value(team, x).is_finite() {
             // The velocity is so high that the predictor overflows: start from the present positions.
@@ -189,7 +196,7 @@ impl ModelSolver {
                 break;
             }
             self.follower.begin(inputs.pressure, x);
-            let mut phi = step_potential!(self, (inputs, history), definite);
+            let mut phi = step_potential!(self, (inputs, history, before), definite);
             let again = self.newton.minimise(team, &mut phi, x, inputs.fixed);
             let (steps, backtracks) = (done.steps + again.steps, done.backtracks + again.backtracks);
             let linear_iterations = done.linear_iterations + again.linear_iterations;

@@ -9,7 +9,16 @@
 //!
 //! The predictor is x̂ = x_a, so that the last term is 0 in the first solve. For implicit Euler s = h²,
 //! r = h, x̂ = x + h v and v̂ = v. Linearised at x_n, a spinning body would gain energy; linearised at
-//! the predictor it never does. K̂ rotates with the material, so β does not damp rigid motion.
+//! the predictor it never does.
+//!
+//! K̂ is R K Rᵀ, plus the twists of the law where tension matters to the step (`operator/twist.rs`); these
+//! enter with s alone, because they must not damp what turns.
+//!
+//! # Damping
+//! K̂ rotates with the material, so β does not damp rigid motion. But from x to x̂ material moves along straight lines, and
+//! K̂ v̂ takes that for an expansion, which β would resist: a spinning body would gain energy. So implicit Euler of a law
+//! that rotates damps by the strains ε = sym(RᵀF) − I, each with the rotation of its own positions: β K̂ v̂ is the force of
+//! the stress of β (ε(x̂) − ε(x))/h. In BDF2 and Newmark's method the expansions of a steady turn cancel.
 
 mod coarse;
 mod equilibrium;
@@ -20,7 +29,8 @@ use coarse::two_level;
 use nalgebra::{Matrix3, Vector3};
 use scindo_algebra::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, LinearOperator, Padded, Spring, StiffModes, Stiffness,
-    Substitution, Sum, SystemOperator, apply, block_of, filter, invert, invert_free, padded, unpadded,
+    Substitution, Sum, SystemOperator, Tension, apply_damping, block_of, filter, invert, invert_free, padded,
+    unpadded,
 };
 use scindo_algebra::solver::multigrid::{CoarsestSolve, CycleShape, Hierarchy, LevelReport, Multigrid};
 use scindo_algebra::solver::two_level::CoarseSpace;
@@ -32,6 +42,7 @@ use scindo_matter::storage::reserve::resize_reserving;
 use scindo_matter::team::phase::Phase;
 use scindo_matter::team::{Team, blocks};
 
+use super::ablation::Ablation;
 use super::active_springs::ActiveSprings;
 use super::descent::Descent;
 use super::parts::Translations;
@@ -39,11 +50,15 @@ use super::simulated_level::SimulatedLevel;
 use super::springs::ActiveSpring;
 use super::state::{State, WEIGHTLESS, hold};
 use super::step_grid::StepGrid;
-use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
+use super::step_inputs::{Inertia, KnownLoads, LinearInputs, Predictor, StepOutcome};
 
 /// Part of the residual that a solve leaves on the way to an equilibrium of a law that rotates, at most; the last
 /// one reaches the tolerance.
 const FORCING: f64 = 0.1;
+/// The equations of a step in motion hold once their residual is this many times the tolerance of its linear solves, or
+/// so small that forces in single precision tell no more of it.
+const EQUATIONS: f64 = 10.0;
+const LEAST_RESIDUAL: f64 = 1e-5;
 /// Largest number of passes of a linear solve, repeated while springs open, close, slip or reach their cap.
 const SPRING_PASSES: usize = 8;
 /// The residual is measured against the right-hand side, but at least against this fraction of the loads.
@@ -53,10 +68,8 @@ const LOAD_FLOOR: f64 = 0.01;
 /// The scratch vectors of a step, one entry per copy.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct LinearStep {
-    /// Linearise at the positions of the last step; only a mutation test sets it.
-    at_start: bool,
-    /// Take the bound of friction from the last step; only a mutation test sets it.
-    lagged: bool,
+    /// What a mutation test leaves out.
+    ablation: Ablation,
     predicted: Vec<Vector3<f64>>,
     f_int: Vec<Padded>,
     damping: Vec<Padded>,
@@ -102,6 +115,9 @@ pub struct LinearStep {
     descent: Descent,
     /// Relative residual at the start of the last solve.
     began: f64,
+    /// The least one at the start of a solve of this step, and how far the last solve moved the predictor [m].
+    least: f64,
+    last: Vec<Padded>,
     /// For relaxation: loads that its search began with, and positions where the last step ended.
     searched: Option<KnownLoads>,
     ended: Vec<Vector3<f64>>,
@@ -125,16 +141,17 @@ struct Stiff {
 const SPRING_ROW: usize = 64;
 
 impl LinearStep {
-    /// An integrator without history. `at_start` linearises at the positions of the last step; only a
-    /// mutation test sets it.
-    pub fn new(at_start: bool, lagged: bool) -> Self {
-        Self { at_start, lagged, ..Self::default() }
+    /// An integrator without history.
+    pub fn new(ablation: Ablation) -> Self {
+        Self { ablation, ..Self::default() }
     }
 
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
         resize_reserving(&mut self.predicted, n, Vector3::zeros());
-        for v in [&mut self.f_int, &mut self.damping, &mut self.scratch, &mut self.delta] {
+        let vectors =
+            [&mut self.f_int, &mut self.damping, &mut self.scratch, &mut self.delta, &mut self.last];
+        for v in vectors {
             resize_reserving(v, n, [0.0; 4]);
         }
         resize_reserving(&mut self.diagonal, n, [0.0; 8]);
@@ -215,7 +232,7 @@ impl LinearStep {
     /// Advances `state` by h if everything stays finite. The force of every spring is written to
     /// `spring_forces`, in the order of the inputs.
     ///
-    /// Several solves are Newton's method with full steps and the held tangent. Each starts from x⁺ of
+    /// Several solves are Newton's method with full steps, until the equations of the step hold. Each starts from x⁺ of
     /// the one before and measures its residual against the loads of the first.
     pub fn step(
         &mut self,
@@ -231,7 +248,7 @@ impl LinearStep {
         }
         self.predict(team, state, inputs);
         self.springs.begin(&inputs.step, &self.predicted);
-        if self.lagged {
+        if self.ablation.lagged_friction {
             self.springs.springs.iter_mut().for_each(ActiveSpring::lag);
         }
         // The line search compares potentials, so springs need the forces of the potential at the predictor.
@@ -239,11 +256,12 @@ impl LinearStep {
             self.choose_modes(inputs);
         }
         let mut solve = LinearReport::default();
-        let (mut inverted_pieces, mut finite, mut solves) = (0, true, 0);
+        let (mut inverted_pieces, mut finite, mut solves, mut backtracks) = (0, true, 0, 0);
+        self.least = f64::INFINITY;
         let mut began = f64::INFINITY;
         self.descent.begin();
         for number in 0..inputs.solves.max(1) {
-            let inverted = self.update_operator(team, elastic, state, inputs);
+            let inverted = self.update_operator(team, elastic, state, number == 0, inputs);
             // Counted where the step begins, not on the way to an equilibrium.
             if number == 0 {
                 inverted_pieces = inverted;
@@ -252,6 +270,12 @@ impl LinearStep {
             self.improve(team, (elastic, inputs), state, number == 0, &mut solve);
             solves += 1;
             finite = solve.stop != StopReason::NonFinite;
+            // The last move went too far: half of it is taken back, and the equations are looked at again.
+            if solve.stop == StopReason::NoDescent && inputs.moves() {
+                backtracks += 1;
+                self.take_back(0.5);
+                continue;
+            }
             let is_last = number + 1 >= inputs.solves;
             if finite && inputs.descends() && self.descend(team, inputs, known, is_last, &mut solve) {
                 break;
@@ -264,6 +288,10 @@ impl LinearStep {
             // In an equilibrium each solve begins with the true residual, while the one before knew only
             // its recurrence. A true residual that has not halved is rounding.
             let none_left = solve.iterations == known;
+            // In motion, the equations hold once their residual is small without another solve.
+            if none_left && inputs.moves() {
+                break;
+            }
             let rounding = number > 0 && !none_left && self.began > 0.5 * began;
             if rounding && !inputs.moves() && solve.stop == StopReason::Converged {
                 (solve.stop, solve.residual) = (StopReason::Stagnated, self.began);
@@ -274,10 +302,12 @@ impl LinearStep {
             }
             began = self.began;
         }
-        // Otherwise the state stays as it was before the step.
-        if finite {
-            self.commit(team, state, inputs, spring_forces);
+        // No solve is left that could tell whether a part of the last move is better than none.
+        if solve.stop == StopReason::NoDescent && inputs.moves() {
+            self.take_back(1.0);
         }
+        // Otherwise the state stays as it was before the step.
+        let work_j = if finite { self.commit(team, state, inputs, spring_forces) } else { 0.0 };
         team.begin(Phase::Guards);
         // Relaxation may continue this search in the next step if nothing changes until then.
         self.searched = None;
@@ -285,8 +315,8 @@ impl LinearStep {
             self.searched.get_or_insert_default().note(inputs);
             self.ended.clone_from(&state.x);
         }
-        let (refused_springs, backtracks) = (self.springs.refused(), self.descent.backtracks);
-        StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, finite }
+        let (refused_springs, backtracks) = (self.springs.refused(), backtracks + self.descent.backtracks);
+        StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, work_j, finite }
     }
 
     /// Makes one linear solve for δ, repeated while springs open, close or reach their cap in it.
@@ -306,15 +336,23 @@ impl LinearStep {
             self.complete_grid(team, elastic, inputs, pass);
             self.complete_coarse(inputs);
             team.begin(Phase::Residual);
-            self.balance_parts(state, inputs);
+            self.balance_parts(state, inputs, first);
             self.residual(team, elastic, state, inputs, (pass, first));
             team.begin(Phase::Solve);
             let report = self.solve(team, elastic, inputs, (pass, first));
-            // A pass with nothing left to do estimates no error.
+            // A pass with nothing left to do estimates no error, and a solve that was not made leaves the one before.
             let algebraic_error = solve.algebraic_error.max(report.algebraic_error);
-            *solve =
-                LinearReport { iterations: solve.iterations + report.iterations, algebraic_error, ..report };
-            self.balance_parts(state, inputs);
+            let iterations = solve.iterations + report.iterations;
+            let before = *solve;
+            *solve = LinearReport { iterations, algebraic_error, ..report };
+            if !first && pass == 0 && report.iterations == 0 && inputs.moves() {
+                *solve = before;
+                if report.stop == StopReason::NoDescent {
+                    solve.stop = report.stop;
+                    return;
+                }
+            }
+            self.balance_parts(state, inputs, first);
             if report.stop == StopReason::NonFinite || !self.springs_changed(inputs, pass) {
                 break;
             }
@@ -333,14 +371,14 @@ impl LinearStep {
     ) {
         team.begin(Phase::Residual);
         self.predicted.copy_from_slice(&state.x);
-        elastic.update(team, &inputs.elastic_update(), &state.x);
+        elastic.update(team, &inputs.elastic_update(), &state.x, None);
         team.for_blocks(blocks(&mut self.f_int, BLOCK), |block, f| elastic.forces(block, f));
         self.made_for = None;
         let Rayleigh { stiffness_s: beta, mass_1_s: alpha } = inputs.material.rayleigh;
         self.damping.fill([0.0; 4]);
         if beta > 0.0 {
             self.scratch.iter_mut().zip(&state.v).for_each(|(out, v)| *out = padded(v));
-            apply(elastic, team, &self.scratch, &mut self.damping); // scale · K̂ v
+            apply_damping(elastic, team, &self.scratch, &mut self.damping); // scale · K̂ v
         }
         let beta = beta / inputs.elastic_update().scale;
         for (c, a) in acceleration.iter_mut().enumerate() {
@@ -388,21 +426,29 @@ impl LinearStep {
         }
     }
 
-    /// Updates rotations, forces, gradients and damping at the predictor. Returns the number of inverted
-    /// pieces.
+    /// Updates rotations, forces, gradients and damping at the predictor, and twists at `state` or, in further solves,
+    /// at the predictor too. Returns the number of inverted pieces.
     fn update_operator(
         &mut self,
         team: &mut Team,
         elastic: &mut dyn Stiffness,
         state: &State,
+        first: bool,
         inputs: &LinearInputs<'_>,
     ) -> usize {
         team.begin(Phase::Operator);
         let (h, beta) = (inputs.step.h, inputs.material.rayleigh.stiffness_s);
         let with = inputs.elastic_update();
         let scale = with.scale;
-        let at = if self.at_start { &state.x } else { &self.predicted };
-        let inverted = elastic.update(team, &with, at);
+        let at = if self.ablation.predictor { &state.x } else { &self.predicted };
+        let tension = Tension {
+            at: if first { &state.x } else { &self.predicted },
+            start: &state.x,
+            s: inputs.s(),
+            density_kg_m3: if inputs.moves() { inputs.material.density_kg_m3 } else { 0.0 },
+            damping: if self.damps_by_strain(inputs) { beta / h } else { 0.0 },
+        };
+        let inverted = elastic.update(team, &with, at, (!self.ablation.twists).then_some(&tension));
         self.sum_chunks(team, elastic, inputs);
         // Without inertia, single-precision forces would be too coarse for the residual.
         if !inputs.moves() {
@@ -419,18 +465,27 @@ impl LinearStep {
                 }),
                 _ => scratch.zip(&state.x).for_each(|((v, to), x)| *v = padded(&((to - x) / h))),
             }
-            apply(elastic, team, &self.scratch, &mut self.damping); // s K̂ v
+            apply_damping(elastic, team, &self.scratch, &mut self.damping); // s K̂ v
             // Linearised at x_n, the predictor is h v away: f_int(x̂) ≈ f_int(x_n) + h K̂ v.
-            let beta = if self.at_start { beta + h } else { beta };
+            let beta = if self.ablation.predictor { beta + h } else { beta };
             let factor = (beta / scale) as f32;
             self.damping.iter_mut().flatten().for_each(|v| *v *= factor); // β K̂ v
         }
         inverted
     }
 
+    /// Whether the forces of the update contain those of damping: in implicit Euler of a law that rotates.
+    fn damps_by_strain(&self, inputs: &LinearInputs<'_>) -> bool {
+        matches!(inputs.inertia, Inertia::Euler)
+            && inputs.material.law.rotates()
+            && !self.ablation.predictor
+            && !self.ablation.twists
+    }
+
     /// Whether the step has a damping term K̂ v.
     fn damps(&self, inputs: &LinearInputs<'_>) -> bool {
-        inputs.moves() && (self.at_start || inputs.material.rayleigh.stiffness_s > 0.0)
+        let by_product = inputs.material.rayleigh.stiffness_s > 0.0 && !self.damps_by_strain(inputs);
+        inputs.moves() && (self.ablation.predictor || by_product)
     }
 
     /// Sums internal forces and, if it changed, the diagonal of A and its inverse, without springs.
@@ -523,22 +578,22 @@ impl LinearStep {
     }
 
     /// Solves the translation equations of every free part for the imbalance that δ leaves.
-    fn balance_parts(&mut self, state: &State, inputs: &LinearInputs<'_>) {
+    fn balance_parts(&mut self, state: &State, inputs: &LinearInputs<'_>, first: bool) {
         if inputs.step.parts.any_free() {
-            self.gather_imbalance(state, inputs);
+            self.gather_imbalance(state, inputs, first);
             self.translations.solve(inputs.step.parts);
         }
     }
 
     /// Sets up the translation equations for the imbalance that δ leaves.
-    fn gather_imbalance(&mut self, state: &State, inputs: &LinearInputs<'_>) {
+    fn gather_imbalance(&mut self, state: &State, inputs: &LinearInputs<'_>, first: bool) {
         let factor = inputs.mass_factor();
         let s = inputs.s();
         self.translations.begin(inputs.step.parts, factor);
         for (c, delta) in self.delta.iter().enumerate() {
             let moved = self.translations.shift[inputs.step.parts.of_copy[c] as usize] + unpadded(delta);
-            let external =
-                inputs.external(c, state, &self.predicted) - inputs.inertia(c, &self.predicted) / s;
+            let at = Predictor { x: &self.predicted, first };
+            let external = inputs.external(c, state, at) - inputs.inertia(c, state, at) / s;
             let missing = s * external - factor * inputs.step.mass[c] * moved;
             self.translations.add(inputs.step.parts, c, missing);
         }
@@ -576,8 +631,8 @@ impl LinearStep {
         if pass > 0 {
             system(elastic, &[], inputs).apply(team, &self.delta, &mut self.scratch);
         }
-        let (f_int, damping, solved, predicted) =
-            (&self.f_int, &self.damping, &self.scratch, &self.predicted);
+        let (f_int, damping, solved) = (&self.f_int, &self.damping, &self.scratch);
+        let at = Predictor { x: &self.predicted, first };
         // In an equilibrium the forces cancel each other, and single precision would leave mostly rounding.
         let exact = (!inputs.moves()).then_some(&self.exact);
         let (M, shift) = (&self.preconditioner, &self.translations.shift);
@@ -587,13 +642,14 @@ impl LinearStep {
             for (i, (r, M)) in r.iter_mut().zip(M.block(block)).enumerate() {
                 let c = block * BLOCK + i;
                 let elastic = exact.map_or_else(|| unpadded(&f_int[c]), |exact| exact[c]);
-                let mut f = inputs.external(c, state, predicted) - elastic;
+                let mut f = inputs.external(c, state, at) - elastic;
                 if damped {
                     f -= unpadded(&damping[c]);
                 }
                 // Moving a free part as a whole strains nothing, so only its mass counts.
                 let moved = shift[inputs.step.parts.of_copy[c] as usize];
-                *r = padded(&(s * f - factor * inputs.step.mass[c] * moved - inputs.inertia(c, predicted)));
+                let inertia = inputs.inertia(c, state, at);
+                *r = padded(&(s * f - factor * inputs.step.mass[c] * moved - inertia));
                 if pass > 0 {
                     for k in 0..4 {
                         r[k] -= solved[c][k];
@@ -669,9 +725,7 @@ impl LinearStep {
             (Some(grid), _) => pcg.precondition(team, &mut A, &mut grid.cycle(preconditioner.inverses())),
         };
         let norm = rz.max(0.0).sqrt();
-        if first && pass == 0 {
-            self.reference = self.reference.max(norm);
-        }
+        self.reference = self.reference.max(if first && pass == 0 { norm } else { 0.0 });
         if pass == 0 {
             self.began = if self.reference > 0.0 { norm / self.reference } else { 0.0 };
         }
@@ -679,6 +733,11 @@ impl LinearStep {
             let (exact, fixed) = (!inputs.material.law.rotates(), inputs.step.fixed);
             let from = (norm, self.reference, inputs.solver, self.method);
             return level.solve(team, (&mut A, exact), fixed, delta, from);
+        }
+        if pass == 0
+            && let Some(none) = without_solve(self.began, &mut self.least, first, inputs)
+        {
+            return none;
         }
         let mut until = inputs.solver;
         // A residual that is small enough ends the search; nothing is left to solve for.
@@ -711,17 +770,28 @@ impl LinearStep {
         report
     }
 
+    /// Moves the predictor back by `part` of its last move, of which the rest is left.
+    fn take_back(&mut self, part: f64) {
+        for (x, last) in self.predicted.iter_mut().zip(&mut self.last) {
+            let moved = unpadded(last);
+            *x -= part * moved;
+            *last = padded(&((1.0 - part) * moved));
+        }
+    }
+
     /// Moves the predictor to x⁺ = x̂ + δ. Returns whether all of it is finite.
     fn move_predictor(&mut self, team: &mut Team, inputs: &LinearInputs<'_>) -> bool {
         team.begin(Phase::Commit);
         let bound = 1e15; // m: far outside any scene, far inside the range of single precision
         let (delta, shift, of_part) = (&self.delta, &self.translations.shift, &inputs.step.parts.of_copy);
-        let results = (blocks(&mut self.predicted, BLOCK), blocks(&mut self.partial, 1));
-        team.for_blocks(results, |block, (next, partial)| {
+        let moved = (blocks(&mut self.predicted, BLOCK), blocks(&mut self.last, BLOCK));
+        team.for_blocks((moved, blocks(&mut self.partial, 1)), |block, ((next, last), partial)| {
             let known = block_of(delta, block).iter().zip(block_of(of_part, block));
             let mut finite = true;
-            for (next, (delta, &part)) in next.iter_mut().zip(known) {
-                *next = *next + shift[part as usize] + unpadded(delta);
+            for ((next, last), (delta, &part)) in next.iter_mut().zip(last).zip(known) {
+                let moved = shift[part as usize] + unpadded(delta);
+                *last = padded(&moved);
+                *next += moved;
                 finite &= next.iter().all(|c| c.abs() < bound);
             }
             partial[0] = f64::from(u8::from(finite));
@@ -733,38 +803,66 @@ impl LinearStep {
         !self.partial.contains(&0.0)
     }
 
-    /// Writes x⁺ and v⁺ to `state`, and the spring forces.
+    /// Writes x⁺ and v⁺ to `state`, and the spring forces. Returns the work [J] that the internal forces did if x⁺ solves
+    /// the equations of the step: Σ (M a⁺ − f_ext − f_springs)·(x⁺ − x).
     fn commit(
         &mut self,
         team: &mut Team,
         state: &mut State,
         inputs: &LinearInputs<'_>,
         spring_forces: &mut [Vector3<f64>],
-    ) {
+    ) -> f64 {
         self.springs.write(spring_forces, |s| s.law().force(s.point(&self.predicted)));
+        let pushed: f64 = self.springs.springs.iter().map(|s| self.work_of(s, state)).sum();
         let (predicted, rate) = (&self.predicted, inputs.rate());
-        let x_v = match inputs.inertia {
-            Inertia::Remembered(history) => Some(history.x_v),
-            Inertia::Euler | Inertia::None { .. } => None,
-        };
-        let results = (blocks(&mut state.x, BLOCK), blocks(&mut state.v, BLOCK));
-        team.for_blocks(results, |block, (x, v)| {
-            let next = block_of(predicted, block);
-            match x_v {
-                None => x.iter_mut().zip(v).zip(next).for_each(|((x, v), next)| {
-                    *v = (next - *x) * rate;
-                    *x = *next;
-                }),
-                Some(x_v) => {
-                    let from = block_of(x_v, block);
-                    x.iter_mut().zip(v).zip(next.iter().zip(from)).for_each(|((x, v), (next, from))| {
-                        *v = (next - from) * rate;
-                        *x = *next;
-                    });
-                }
+        let alpha = inputs.material.rayleigh.mass_1_s;
+        let results =
+            (blocks(&mut state.x, BLOCK), blocks(&mut state.v, BLOCK), blocks(&mut self.partial, 1));
+        team.for_blocks(results, |block, (x, v, work)| {
+            let first = block * BLOCK;
+            let mut sum = 0.0;
+            for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
+                let (c, next) = (first + i, predicted[first + i]);
+                let moved = next - *x;
+                let (faster, a) = match &inputs.inertia {
+                    Inertia::Remembered(h) => ((next - h.x_v[c]) * rate, (next - h.x_a[c]) * h.increment.A),
+                    Inertia::Euler | Inertia::None { .. } => (moved * rate, (moved * rate - *v) * rate),
+                };
+                let inertia = inputs.step.mass[c] * (a + alpha * faster - inputs.step.gravity);
+                sum += (inertia - inputs.step.load[c]).dot(&moved);
+                (*x, *v) = (next, faster);
             }
+            work[0] = sum;
         });
+        self.partial.iter().sum::<f64>() - pushed
     }
+
+    /// Work [J] of a spring in the step.
+    fn work_of(&self, spring: &ActiveSpring, state: &State) -> f64 {
+        let to = spring.point(&self.predicted);
+        spring.law().force(to).dot(&(to - spring.point(&state.x)))
+    }
+}
+
+/// The report of a solve of a step in motion that is not made: because the equations hold at its start, or because the
+/// residual there is larger than the `least` one so far.
+fn without_solve(
+    began: f64,
+    least: &mut f64,
+    first: bool,
+    inputs: &LinearInputs<'_>,
+) -> Option<LinearReport> {
+    if !inputs.moves() {
+        return None;
+    }
+    if !first && began <= (EQUATIONS * inputs.solver.tolerance).max(LEAST_RESIDUAL) {
+        return Some(LinearReport::default());
+    }
+    if began > *least {
+        return Some(LinearReport { stop: StopReason::NoDescent, ..LinearReport::default() });
+    }
+    *least = began;
+    None
 }
 
 /// Multigrid, if the springs of the present solve allow cycles.

@@ -5,14 +5,16 @@ use nalgebra::Vector3;
 use scindo_algebra::assembly::ModelError;
 use scindo_algebra::operator::{ElasticUpdate, Stiffness};
 use scindo_algebra::solver::multigrid::{CoarsestSolve, CycleShape, LevelReport};
-use scindo_algebra::solver::{Method, PcgSettings};
+use scindo_algebra::solver::{Method, PcgSettings, StopReason};
 use scindo_matter::element::{Points, Simd};
 use scindo_matter::material::Material;
 use scindo_matter::storage::reserve::{refill, resize_reserving};
 use scindo_matter::team::Team;
 
+use super::ablation::Ablation;
 use super::course::Course;
 use super::linear_step::LinearStep;
+use super::multistep::MOST_SOLVES;
 use super::notice::Notice;
 use super::report::{Outcome, SolveReport};
 use super::scheme::Scheme;
@@ -53,6 +55,10 @@ pub struct LinearlyImplicit {
     simulate_level: usize,
     cycle: CycleShape,
     relaxes: bool,
+    /// Whether steps of any scheme take as many solves as their equations need.
+    careful: bool,
+    /// Whether the iterations of the last solve were too few. More solves would leave as much.
+    limited: bool,
     #[serde(with = "scindo_algebra::operator::saved_stiffness")]
     stiffness: Box<dyn Stiffness>,
     /// Whether the stiffness uses only instructions that every machine has.
@@ -73,13 +79,12 @@ struct Weightless {
 }
 
 impl LinearlyImplicit {
-    /// Steps with `stiffness`, which was made for the instructions `simd`. `at_start` linearises at
-    /// the positions of the last step, and `lagged` takes friction from the last step; only mutation tests set them.
+    /// Steps with `stiffness`, which was made for the instructions `simd`.
     pub fn new(
         (scheme, material): (Scheme, Material),
         settings: SolverSettings,
         (stiffness, simd): (Box<dyn Stiffness>, Simd),
-        (at_start, lagged): (bool, bool),
+        ablation: Ablation,
     ) -> Self {
         let (solves, pcg) = settings.linear;
         Self {
@@ -91,10 +96,12 @@ impl LinearlyImplicit {
             simulate_level: usize::from(settings.simulate_level),
             cycle: settings.cycle,
             relaxes: settings.relaxation.is_some(),
+            careful: false,
+            limited: false,
             stiffness,
             simd,
             mass_f32: Vec::new(),
-            step: LinearStep::new(at_start, lagged),
+            step: LinearStep::new(ablation),
             weightless: Vec::new(),
             levels_follow: false,
         }
@@ -108,27 +115,33 @@ impl LinearlyImplicit {
         (scheme, inputs): (Scheme, &StepInputs<'_>),
         (report, spring_forces): (&mut SolveReport, &mut [Vector3<f64>]),
     ) -> bool {
-        (report.residual, report.algebraic_error) = (0.0, 0.0);
+        (report.residual, report.algebraic_error, report.internal_work_j) = (0.0, 0.0, 0.0);
         for _ in 0..report.substeps {
             let inertia = match course.multistep.extrapolate(team, state, (scheme, inputs.h)) {
                 Some(history) => Inertia::Remembered(history),
                 None if scheme == Scheme::Static => Inertia::None { relax: self.relaxes },
                 None => Inertia::Euler,
             };
-            let solves = if scheme == Scheme::ImplicitEuler { 1 } else { self.solves };
+            let solves = match scheme {
+                _ if self.careful && !self.limited && scheme != Scheme::Static => MOST_SOLVES,
+                Scheme::ImplicitEuler => 1,
+                _ => self.solves,
+            };
             let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
             let inputs = LinearInputs { step: *inputs, mass_f32, material, solver: *pcg, inertia, solves };
-            let StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, finite } =
+            let StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, work_j, finite } =
                 step.step(team, &mut **stiffness, state, &inputs, spring_forces);
             report.newton_steps += solves;
             report.iterations += solve.iterations;
             report.residual = report.residual.max(solve.residual);
             report.stop = solve.stop;
+            self.limited = solve.stop == StopReason::IterationLimit;
             // δ minimises s times an energy, so its norm is in √J times √s.
             report.algebraic_error = report.algebraic_error.max(solve.algebraic_error / inputs.root_s());
             report.inverted_pieces = inverted_pieces;
             report.refused_springs = refused_springs;
             report.backtracks += backtracks;
+            report.internal_work_j += work_j;
             if !finite {
                 return false;
             }
@@ -233,6 +246,10 @@ impl StepSolver for LinearlyImplicit {
         report.outcome = Outcome::Held;
     }
 
+    fn be_careful(&mut self, careful: bool) {
+        self.careful = careful;
+    }
+
     fn accelerate(
         &mut self,
         team: &mut Team,
@@ -284,7 +301,7 @@ impl StepSolver for LinearlyImplicit {
             self.stiffness = stiffness;
         }
         self.stiffness.set_choice(choice);
-        self.levels_follow = false;
+        (self.levels_follow, self.limited) = (false, false);
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! Time integration: one step in time, or the way to an equilibrium.
 
+mod ablation;
 mod state;
 mod scheme;
 mod settings;
@@ -13,6 +14,7 @@ mod course;
 mod multistep;
 mod history;
 mod guard;
+mod balance;
 mod notice;
 pub(crate) mod increment;
 mod parts;
@@ -37,6 +39,7 @@ mod explicit;
 mod critical_step;
 mod mass;
 
+pub use ablation::Ablation;
 pub use critical_step::{omega_max, stable_step};
 pub use dynamics::Dynamics;
 pub use free_motion::{FreeMotion, free_motions};

@@ -55,6 +55,8 @@ pub struct ModelSolver {
     /// Buffers for the stages of explicit schemes.
     pub(super) stages: [Vec<Vector3<f64>>; 5],
     pub(super) damping: Option<BlockCsr<f64>>,
+    /// What its product with the motion of a step has too much of the change of strain [N].
+    pub(super) turned: Vec<Vector3<f64>>,
     pub(super) tangent: Option<BlockCsr<f64>>,
     pub(super) power: PowerIteration,
     /// ω_max² [1/s²] without springs, and the number of explicit steps until it is computed again.
@@ -77,6 +79,7 @@ impl ModelSolver {
             force: Vec::new(),
             stages: Default::default(),
             damping: None,
+            turned: Vec::new(),
             tangent: None,
             power: PowerIteration::default(),
             omega_squared: None,
@@ -90,9 +93,9 @@ impl ModelSolver {
 
     /// Makes room for the nodes of the model, so that a step allocates nothing.
     fn resize(&mut self) {
-        let Self { model, settings, material, f_ext, scratch, force, stages, power, .. } = self;
+        let Self { model, settings, material, f_ext, scratch, force, turned, stages, power, .. } = self;
         let n = model.n_nodes();
-        for v in [f_ext, scratch, force] {
+        for v in [f_ext, scratch, force, turned] {
             resize_reserving(v, n, Vector3::zeros());
         }
         self.damping = (material.rayleigh.stiffness_s > 0.0).then(|| model.pattern());

@@ -18,6 +18,9 @@ use super::spin::SpinGuard;
 use super::state::State;
 use super::step_inputs::{StepHistory, StepInputs};
 
+/// Most linear solves of a step whose equations are to hold.
+pub(super) const MOST_SOLVES: u32 = 8;
+
 /// A change of the elements that leaves the material whole.
 #[derive(Clone, Copy, Debug)]
 pub enum Adapted<'a> {
@@ -228,9 +231,10 @@ impl Multistep {
         Some(StepHistory { increment, x_a: &self.x_a, x_v: &self.x_v })
     }
 
-    /// Linear solves per step. Where the body may turn, Newmark's method needs two: with one it gains energy.
+    /// Most linear solves per step. Where the body may turn, Newmark's method needs several, until its equations hold:
+    /// it has no damping of its own, so that what one solve leaves would add up.
     pub fn solves(scheme: Scheme, law: Law) -> u32 {
-        if matches!(scheme, Scheme::Newmark { .. }) && law.rotates() { 2 } else { 1 }
+        if matches!(scheme, Scheme::Newmark { .. }) && law.rotates() { MOST_SOLVES } else { 1 }
     }
 
     /// Begins the energy balance of a step, with the kinetic energy and that of loads and springs [J]; `stored`

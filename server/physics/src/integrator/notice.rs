@@ -58,6 +58,14 @@ pub enum Notice {
         /// Energy gained beyond the work that was put in [J].
         excess_j: f64,
     },
+    /// The internal forces did more work in the last steps than energy was released: the equations of these steps did not
+    /// hold. The next steps take more solves.
+    Unbalanced {
+        /// Energy that came from nowhere [J].
+        excess_j: f64,
+        /// Whether the steps had taken several solves already.
+        careful: bool,
+    },
     /// Elements were inverted or collapsed, so more Newton steps were allowed than requested.
     Recovery,
     /// A part of the body is held nowhere, so there is no equilibrium.
@@ -118,6 +126,14 @@ impl fmt::Display for Notice {
             Self::SpinDivided { substeps } => {
                 write!(f, "loose parts turned far and gained energy: divided into {substeps} sub-steps")
             }
+            Self::Unbalanced { excess_j, careful } => write!(
+                f,
+                "{excess_j:.1e} J came from nowhere in the last steps: {}",
+                match careful {
+                    false => "one solve did not balance their forces; the next steps take several",
+                    true => "even several solves did not balance their forces",
+                }
+            ),
             Self::EnergyGained { excess_j } => {
                 write!(f, "gained {excess_j:.3e} J of energy: repeated with implicit Euler")
             }

@@ -3,9 +3,11 @@
 //! Every implicit scheme sets a⁺ = A (x⁺ − x_a) and v⁺ = B (x⁺ − x_v) in
 //! M a⁺ + (α M + β K̂) v⁺ + f_int(x⁺) = f_ext + f_springs(x⁺), which is ∇Φ(x⁺) = 0 of
 //!
-//!   Φ(x) = A/2 ‖x − x_a‖²_M + αB/2 ‖x − x_v‖²_M + βB/2 ‖x − x_v‖²_K̂ + Ψ(x) − f_ext·(x − x_a) + Σ springs + P(x)
+//!   Φ(x) = A/2 ‖x − x_a‖²_M + αB/2 ‖x − x_v‖²_M + βB (½ ‖x − x_v‖²_K̂ − c·(x − x_v)) + Ψ(x) − f_ext·(x − x_a) + Σ springs
+//!          + P(x)
 //!
-//! with K̂ held at the predictor, and [pressure](scindo_algebra::assembly::pressure) as the potential P around the iterate.
+//! with K̂ held at the predictor. In implicit Euler c is the part of K̂ (x − x_v) that is a turn and no strain. P is the
+//! potential of [pressure](scindo_algebra::assembly::pressure) around the iterate.
 //!
 //! # Source
 //! Radovitzky, Ortiz 1999 (incremental potential of Newmark schemes); Martin et al. 2011.
@@ -31,6 +33,10 @@ pub(super) struct StepPotential<'a> {
     pub alpha: f64,
     /// β [s] and K̂ at the predictor, if β > 0.
     pub damping: Option<(f64, &'a BlockCsr<f64>)>,
+    /// What K̂ (x − x_v) has too much of the change of strain [N].
+    pub turned: &'a [Vector3<f64>],
+    /// Positions whose tension stiffens a step of one solve.
+    pub tension: Option<&'a [Vector3<f64>]>,
     /// Gravity and loads [N].
     pub f_ext: &'a [Vector3<f64>],
     pub springs: &'a [ActiveSpring],
@@ -67,9 +73,10 @@ impl StepPotential<'_> {
             difference(x, self.x_v, self.scratch);
             K.multiply(self.scratch, self.force);
             for (c, (f, d)) in self.force.iter().zip(&*self.scratch).enumerate() {
-                phi += 0.5 * beta * B * f.dot(d);
+                let turned = self.turned[c];
+                phi += beta * B * (0.5 * f - turned).dot(d);
                 if let Some(g) = g.as_deref_mut() {
-                    g[c] += beta * B * f;
+                    g[c] += beta * B * (f - turned);
                 }
             }
         }
@@ -126,6 +133,9 @@ impl Potential for StepPotential<'_> {
             Curvature::Definite => self.definite,
         };
         self.model.tangent_by(team, x, kind, H);
+        if let (Tangent::Held, Some(from)) = (kind, self.tension) {
+            self.model.add_twists(x, from, H);
+        }
         self.add_rest_of_hessian(x, H);
     }
 

@@ -37,6 +37,8 @@ pub struct SolveReport {
     pub stable_step_s: Option<f64>,
     /// Elastic energy at the end [J], where the step had to compute it.
     pub elastic_j: Option<f64>,
+    /// Work [J] that the internal forces did if the step solved its equations; 0 where nobody asks.
+    pub internal_work_j: f64,
     /// What the step did differently from what was requested.
     pub notice: Option<Notice>,
 }
@@ -48,6 +50,11 @@ impl SolveReport {
     /// in equilibria and Newton's method, a small part of √(2Ψ).
     pub fn is_unconverged(&self) -> bool {
         self.outcome == Outcome::Advanced && self.tolerance > 0.0 && self.residual > self.tolerance
+    }
+
+    /// Whether energy came from nowhere in this step and those just before it: the body may shake for ever.
+    pub fn is_unbalanced(&self) -> bool {
+        matches!(self.notice, Some(Notice::Unbalanced { .. }))
     }
 
     /// Whether the step failed as a whole and was made in parts. Sub-steps that an explicit integrator

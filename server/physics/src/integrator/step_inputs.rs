@@ -80,6 +80,15 @@ pub struct LinearInputs<'a> {
     pub solves: u32,
 }
 
+/// Where a solve of a step begins.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Predictor<'a> {
+    /// Position x̂ of every copy [m].
+    pub x: &'a [Vector3<f64>],
+    /// Whether it is the first solve of the step.
+    pub first: bool,
+}
+
 /// How a scheme treats inertia.
 #[derive(Clone, Copy, Debug)]
 pub enum Inertia<'a> {
@@ -158,30 +167,33 @@ impl LinearInputs<'_> {
         matches!(self.inertia, Inertia::None { relax: true, .. })
     }
 
-    /// v̂ = B (x̂ − x_v), the velocity of copy `c` at the predictor x̂.
+    /// v̂ = B (x̂ − x_v), the velocity of copy `c` at the predictor.
     #[inline(always)]
-    fn predicted_velocity(&self, c: usize, state: &State, predicted: &[Vector3<f64>]) -> Vector3<f64> {
+    fn velocity(&self, c: usize, state: &State, at: Predictor<'_>) -> Vector3<f64> {
         match &self.inertia {
-            Inertia::Euler => state.v[c],
-            Inertia::Remembered(h) => h.increment.B * (predicted[c] - h.x_v[c]),
+            Inertia::Euler if at.first => state.v[c],
+            Inertia::Euler => (at.x[c] - state.x[c]) * self.rate(),
+            Inertia::Remembered(h) => h.increment.B * (at.x[c] - h.x_v[c]),
             Inertia::None { .. } => Vector3::zeros(),
         }
     }
 
-    /// M (x̂ − x_a) of copy `c`, and 0 for implicit Euler, which makes one solve from x_a.
+    /// M (x̂ − x_a) of copy `c`. The first solve of implicit Euler begins from x_a.
     #[inline(always)]
-    pub(super) fn inertia(&self, c: usize, predicted: &[Vector3<f64>]) -> Vector3<f64> {
-        match &self.inertia {
-            Inertia::Remembered(h) => self.step.mass[c] * (predicted[c] - h.x_a[c]),
-            Inertia::Euler | Inertia::None { .. } => Vector3::zeros(),
-        }
+    pub(super) fn inertia(&self, c: usize, state: &State, at: Predictor<'_>) -> Vector3<f64> {
+        let x_a = match &self.inertia {
+            Inertia::Remembered(h) => h.x_a[c],
+            Inertia::Euler if !at.first => state.x[c] + self.step.h * state.v[c],
+            Inertia::Euler | Inertia::None { .. } => return Vector3::zeros(),
+        };
+        self.step.mass[c] * (at.x[c] - x_a)
     }
 
     /// m g + load − α m v̂ of copy `c` [N].
     #[inline(always)]
-    pub(super) fn external(&self, c: usize, state: &State, predicted: &[Vector3<f64>]) -> Vector3<f64> {
+    pub(super) fn external(&self, c: usize, state: &State, at: Predictor<'_>) -> Vector3<f64> {
         let drag = self.material.rayleigh.mass_1_s;
-        let velocity = self.predicted_velocity(c, state, predicted);
+        let velocity = self.velocity(c, state, at);
         self.step.mass[c] * (self.step.gravity - drag * velocity) + self.step.load[c]
     }
 
@@ -247,6 +259,8 @@ pub struct StepOutcome {
     pub refused_springs: usize,
     /// Halvings of the line searches of an equilibrium.
     pub backtracks: u32,
+    /// Work [J] that the internal forces did if the step solved its equations.
+    pub work_j: f64,
     /// Whether everything stayed finite. If not, the state was left as it was.
     pub finite: bool,
 }

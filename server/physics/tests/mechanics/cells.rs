@@ -19,13 +19,13 @@ fn updates_and_products_do_not_allocate() {
     let (v, mut y) = (vec![[1.0, 0.5, -0.25, 0.0]; x.len()], vec![[0.0; 4]; x.len()]);
     for law in [Law::Corotational, Law::Linear] {
         let with = ElasticUpdate { lame: Lame { mu: 4e4, lambda: 9e4 }, law, scale: 1e-4 };
-        stiffness.update(&mut team, &with, &x);
+        stiffness.update(&mut team, &with, &x, None);
         // The first product with a direction makes room for it.
         stiffness.multiply_direction(&mut team, &v, 0.0);
         let before = allocations();
         for k in 0..3 {
             x.iter_mut().for_each(|x| x.y += 0.01 * (5.0 * x.x + f64::from(k)).sin());
-            assert_eq!(stiffness.update(&mut team, &with, &x), 0);
+            assert_eq!(stiffness.update(&mut team, &with, &x, None), 0);
             apply(&mut stiffness, &mut team, &v, &mut y);
             stiffness.multiply_direction(&mut team, &v, 0.5);
         }

@@ -13,7 +13,9 @@ use scindo_physics::element::ElementKind;
 use scindo_physics::element::{Point, Points, Simd};
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, MeshError, TetMesh, box_mesh};
-use scindo_physics::operator::{Block6, Direction, ElasticUpdate, Padded, Place, StiffModes, Stiffness};
+use scindo_physics::operator::{
+    Block6, Direction, ElasticUpdate, Padded, Place, StiffModes, Stiffness, Tension,
+};
 use scindo_physics::skin::{OwnSurface, Skin, SkinError, SkinSettings, SkinShape};
 use scindo_physics::space::{RestPoint, Space, Tets, VisitPiece};
 use scindo_physics::team::Team;
@@ -129,8 +131,14 @@ struct Kernel {
 }
 
 impl Stiffness for Kernel {
-    fn update(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> usize {
-        self.elastic.update(team, with, positions)
+    fn update(
+        &mut self,
+        team: &mut Team,
+        with: &ElasticUpdate,
+        positions: &[Vector3<f64>],
+        tension: Option<&Tension<'_>>,
+    ) -> usize {
+        self.elastic.update(team, with, positions, tension)
     }
 
     fn energy(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> Option<f64> {
@@ -151,6 +159,10 @@ impl Stiffness for Kernel {
 
     fn multiply(&mut self, team: &mut Team, x: &[Padded]) {
         self.elastic.multiply(team, x);
+    }
+
+    fn multiply_damping(&mut self, team: &mut Team, x: &[Padded]) {
+        self.elastic.multiply_damping(team, x);
     }
 
     fn multiply_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32) {

@@ -35,6 +35,7 @@ mod sensible;
 mod simulated;
 mod snapping;
 mod springs;
+mod tension;
 mod together;
 mod two_level;
 mod verdicts;

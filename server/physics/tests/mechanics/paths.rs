@@ -42,7 +42,7 @@ fn path(settings: &BodySettings, law: Law) -> &'static str {
     match (settings.why_general(law), settings.scheme, law.rotates()) {
         (Some(_), ..) => "general",
         (None, Scheme::Static, true) => "fast, with a line search",
-        (None, scheme, _) if Multistep::solves(scheme, law) == 2 => "fast, 2 solves",
+        (None, scheme, _) if Multistep::solves(scheme, law) > 1 => "fast, up to 8 solves",
         _ => "fast",
     }
 }

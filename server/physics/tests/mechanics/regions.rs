@@ -124,13 +124,13 @@ fn swing(settings: BodySettings, mesh: &TetMesh) -> Body {
     let mut body = Body::with_regions(mesh.clone(), regions, material, settings).unwrap();
     let held = nodes_at(&body, 0.0);
     body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
-    for step in 0..20 {
-        if step == 10 {
+    for step in 0..80 {
+        if step == 40 {
             let segment = |z: f64| [Vector3::new(0.47, -0.1, z), Vector3::new(0.47, 0.4, z - 0.1)];
             let sweep = BladeSweep { segments: vec![segment(0.4), segment(0.05)] };
             assert!(body.cut(&sweep, 1).unwrap().elements_cut > 8);
         }
-        let report = body.step(0.01, Vector3::new(0.0, 0.0, -9.81), &[]);
+        let report = body.step(0.0025, Vector3::new(0.0, 0.0, -9.81), &[]);
         assert_eq!(report.outcome, Outcome::Advanced);
     }
     body

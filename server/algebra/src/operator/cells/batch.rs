@@ -7,6 +7,7 @@ use scindo_matter::element::{
 };
 
 use super::super::Padded;
+use super::super::twist::{self, TwistBatch, read_twist};
 use super::sectors::SectorTable;
 
 /// Eight cells with one table.
@@ -41,27 +42,32 @@ impl TableLanes {
 /// The corners of eight cells: component, then slot or parity.
 pub(super) type Corners<V> = [[V; 8]; 3];
 
-/// y += Σ Wᵀ c R̂ S R̂ᵀ W x over the batches. `weights` has an entry per batch, or none if no slot hangs.
+/// The cells of one group, as a product reads them.
+#[derive(Clone, Copy)]
+pub(super) struct GroupCells<'a> {
+    pub batches: &'a [SectorBatch],
+    /// Their twists; empty where these do not matter.
+    pub twists: &'a [TwistBatch],
+    /// Weights of hanging vertices; empty if there are none.
+    pub weights: &'a [HangingWeights],
+    pub table: &'a TableLanes,
+}
+
+/// y += Σ Wᵀ c R̂ S R̂ᵀ W x over the batches. `weights` has an entry per batch, or none if no slot hangs; `twists` has one,
+/// or none if twists do not count.
 ///
 /// # Safety
 /// All local numbers are below the lengths of `x` and `y`, which are the same.
-pub(super) unsafe fn multiply(
-    simd: Simd,
-    batches: &[SectorBatch],
-    weights: &[HangingWeights],
-    table: &TableLanes,
-    x: &[Padded],
-    y: &mut [Padded],
-) {
+pub(super) unsafe fn multiply(simd: Simd, cells: GroupCells<'_>, x: &[Padded], y: &mut [Padded]) {
     match simd {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: these come from `Simd::detect` only; the rest is the caller's promise.
-        Simd::Avx2 => unsafe { avx2::multiply(batches, weights, table, x, y) },
+        Simd::Avx2 => unsafe { avx2::multiply(cells, x, y) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Simd::Avx512 => unsafe { avx512::multiply(batches, weights, table, x, y) },
+        Simd::Avx512 => unsafe { avx512::multiply(cells, x, y) },
         // SAFETY: the caller's promise.
-        _ => unsafe { multiply_some::<Lanes, 1>(batches, weights, table, x, y) },
+        _ => unsafe { multiply_some::<Lanes, 1>(cells, x, y) },
     }
 }
 
@@ -71,19 +77,19 @@ pub(super) unsafe fn multiply(
 /// As for [`multiply`].
 #[inline(always)]
 unsafe fn multiply_some<V: Batched<N>, const N: usize>(
-    batches: &[SectorBatch],
-    weights: &[HangingWeights],
-    table: &TableLanes,
+    cells: GroupCells<'_>,
     x: &[Padded],
     y: &mut [Padded],
 ) {
-    let batches = batches.as_chunks().0;
+    let GroupCells { batches, twists, weights, table } = cells;
+    let (batches, twists, weights) = (batches.as_chunks().0, twists.as_chunks().0, weights.as_chunks().0);
     // SAFETY: the caller's promise.
     unsafe {
-        if weights.is_empty() {
-            multiply_with::<V, N, false>(batches, &[], table, x, y);
-        } else {
-            multiply_with::<V, N, true>(batches, weights.as_chunks().0, table, x, y);
+        match (weights.is_empty(), twists.is_empty()) {
+            (true, true) => multiply_with::<V, N, false, false>(batches, twists, weights, table, x, y),
+            (true, false) => multiply_with::<V, N, false, true>(batches, twists, weights, table, x, y),
+            (false, true) => multiply_with::<V, N, true, false>(batches, twists, weights, table, x, y),
+            (false, false) => multiply_with::<V, N, true, true>(batches, twists, weights, table, x, y),
         }
     }
 }
@@ -91,8 +97,9 @@ unsafe fn multiply_some<V: Batched<N>, const N: usize>(
 /// # Safety
 /// As for [`multiply`].
 #[inline(always)]
-unsafe fn multiply_with<V: Batched<N>, const N: usize, const HANGING: bool>(
+unsafe fn multiply_with<V: Batched<N>, const N: usize, const HANGING: bool, const TWISTED: bool>(
     batches: &[[SectorBatch; N]],
+    twists: &[[TwistBatch; N]],
     weights: &[[HangingWeights; N]],
     table: &TableLanes,
     x: &[Padded],
@@ -112,7 +119,13 @@ unsafe fn multiply_with<V: Batched<N>, const N: usize, const HANGING: bool>(
             interpolate(&mut u, &read_weights(&weights[b]));
         }
         transform(&mut u);
-        multiply_sectors(&mut u, table);
+        if TWISTED {
+            let torque = torque(&u, &read_twist(&twists[b]));
+            multiply_sectors(&mut u, table);
+            add_torque(&mut u, &torque);
+        } else {
+            multiply_sectors(&mut u, table);
+        }
         transform(&mut u);
         if HANGING {
             distribute(&mut u, &read_weights(&weights[b]));
@@ -295,25 +308,35 @@ pub(super) fn multiply_sectors<V: Batched<N>, const N: usize>(u: &mut Corners<V>
     });
 }
 
+/// Q ω, where ω is half the curl of the mean gradient of û.
+#[inline(always)]
+fn torque<V: Vector>(u: &Corners<V>, Q: &[V; 6]) -> [V; 3] {
+    let half = V::splat(0.5);
+    twist::times(Q, &[half * (u[2][2] - u[1][4]), half * (u[0][4] - u[2][1]), half * (u[1][1] - u[0][2])])
+}
+
+/// Adds the forces of Q ω.
+#[inline(always)]
+fn add_torque<V: Vector>(u: &mut Corners<V>, torque: &[V; 3]) {
+    let [x, y, z] = *torque;
+    (u[2][2], u[1][4]) = (u[2][2] + x, u[1][4] - x);
+    (u[0][4], u[2][1]) = (u[0][4] + y, u[2][1] - y);
+    (u[1][1], u[0][2]) = (u[1][1] + z, u[0][2] - z);
+}
+
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
     //! The same loop compiled for AVX2 and FMA.
 
-    use super::{HangingWeights, Padded, SectorBatch, TableLanes};
+    use super::{GroupCells, Padded};
     use scindo_matter::element::avx2::Register;
 
     /// # Safety
     /// As for [`super::multiply`].
     #[target_feature(enable = "avx2,fma")]
-    pub(super) unsafe fn multiply(
-        batches: &[SectorBatch],
-        weights: &[HangingWeights],
-        table: &TableLanes,
-        x: &[Padded],
-        y: &mut [Padded],
-    ) {
+    pub(super) unsafe fn multiply(cells: GroupCells<'_>, x: &[Padded], y: &mut [Padded]) {
         // SAFETY: the caller's promise.
-        unsafe { super::multiply_some::<Register, 1>(batches, weights, table, x, y) };
+        unsafe { super::multiply_some::<Register, 1>(cells, x, y) };
     }
 }
 
@@ -321,27 +344,25 @@ mod avx2 {
 mod avx512 {
     //! The same loop for two batches at once; one that is left over takes AVX2.
 
-    use super::{HangingWeights, Padded, SectorBatch, TableLanes};
+    use super::{GroupCells, Padded};
     use scindo_matter::element::avx2::Register;
     use scindo_matter::element::avx512::Register512;
 
     /// # Safety
     /// As for [`super::multiply`].
     #[target_feature(enable = "avx512f,avx2,fma")]
-    pub(super) unsafe fn multiply(
-        batches: &[SectorBatch],
-        weights: &[HangingWeights],
-        table: &TableLanes,
-        x: &[Padded],
-        y: &mut [Padded],
-    ) {
+    pub(super) unsafe fn multiply(cells: GroupCells<'_>, x: &[Padded], y: &mut [Padded]) {
         // SAFETY: the caller's promise.
-        unsafe { super::multiply_some::<Register512, 2>(batches, weights, table, x, y) };
-        if batches.len() % 2 == 1 {
-            let (batches, weights) =
-                (&batches[batches.len() - 1..], &weights[weights.len().saturating_sub(1)..]);
+        unsafe { super::multiply_some::<Register512, 2>(cells, x, y) };
+        if cells.batches.len() % 2 == 1 {
+            let last = GroupCells {
+                batches: &cells.batches[cells.batches.len() - 1..],
+                twists: &cells.twists[cells.twists.len().saturating_sub(1)..],
+                weights: &cells.weights[cells.weights.len().saturating_sub(1)..],
+                table: cells.table,
+            };
             // SAFETY: the caller's promise.
-            unsafe { super::multiply_some::<Register, 1>(batches, weights, table, x, y) };
+            unsafe { super::multiply_some::<Register, 1>(last, x, y) };
         }
     }
 }

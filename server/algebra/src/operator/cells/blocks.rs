@@ -6,9 +6,10 @@ use nalgebra::Matrix3;
 use scindo_matter::element::{Ids, LANES, Lanes, Simd, Vector8};
 
 use super::super::tet_batch::Block6;
+use super::super::twist::{self, TwistBatch, read_twist};
 use super::batch::SectorBatch;
 use super::interleave::interleave;
-use super::sectors::{ENTRY, Matrix24, SectorTable, diagonal_blocks};
+use super::sectors::{ENTRY, Matrix24, SectorTable, diagonal_blocks, hanging_slots};
 use super::stored::{Entry, StoredBatch, stored_entry};
 
 /// Diagonal blocks (xx, xy, xz, yy, yz, zz) of a table in the frame of a cell, by the set of hanging slots.
@@ -88,6 +89,47 @@ unsafe fn add_with<V: Vector8>(
             }
         }
     }
+}
+
+/// Adds the blocks of the twists of the batches, which are few: only stretched chunks have them. `hanging` as in [`add`].
+pub(super) fn add_twists(
+    batches: &[SectorBatch],
+    twists: &[TwistBatch],
+    hanging: &[[u8; LANES]],
+    rows: &mut [Block6],
+) {
+    for (b, (batch, twist)) in batches.iter().zip(twists).enumerate() {
+        let Q = read_twist::<Lanes, 1>(std::array::from_ref(twist));
+        let R: [[Lanes; 3]; 3] =
+            [0, 3, 6].map(|i| [batch.rotation[i], batch.rotation[i + 1], batch.rotation[i + 2]]);
+        let sums = match hanging.get(b) {
+            None => corner_signs(&[0; LANES]),
+            Some(hanging) => corner_signs(hanging),
+        };
+        for (ids, g) in batch.nodes.iter().zip(&sums) {
+            let [xx, xy, xz, yy, yz, zz] = twist::turned(&twist::block(&Q, g), &R);
+            for lane in 0..LANES {
+                let row = &mut rows[usize::from(ids[lane])];
+                let block = [xx, xy, xz, Lanes::default(), yy, yz, zz, Lanes::default()];
+                row.iter_mut().zip(block).for_each(|(sum, entry)| *sum += entry.0[lane]);
+            }
+        }
+    }
+}
+
+/// For every slot Σ W (±1, ±1, ±1) over the corners that its vertex carries: 4 a times the mean gradient of its shape
+/// function in a cell of side a.
+fn corner_signs(hanging: &[u8; LANES]) -> [[Lanes; 3]; 8] {
+    let mut sums = [[Lanes::default(); 3]; 8];
+    for (lane, &hanging) in hanging.iter().enumerate() {
+        for j in 0..8 {
+            let (slots, weight) = if hanging >> j & 1 == 1 { hanging_slots(j) } else { (1 << j, 1.0) };
+            for (v, k) in (0..24).map(|vk| (vk / 3, vk % 3)).filter(|(v, _)| slots >> v & 1 == 1) {
+                sums[v][k].0[lane] += if j >> k & 1 == 1 { -weight as f32 } else { weight as f32 };
+            }
+        }
+    }
+    sums
 }
 
 #[inline(always)]

@@ -13,7 +13,8 @@ use smallvec::SmallVec;
 use super::super::Padded;
 use super::super::chunks::{NO_PIECE, pack};
 use super::super::tet_batch::Block6;
-use super::batch::{self, HangingWeights, SectorBatch, TableLanes};
+use super::super::twist::{TwistBatch, TwistCoefficients};
+use super::batch::{self, GroupCells, HangingWeights, SectorBatch, TableLanes};
 use super::blocks::{self, BlockTable};
 use super::lane::{CellLane, CellMatrix, HANGING_SLOTS, frame, turned};
 use super::sectors::hanging_slots;
@@ -32,6 +33,8 @@ pub(super) struct Table {
     pub lanes: TableLanes,
     /// For diagonal blocks.
     pub blocks: BlockTable,
+    /// Constants of twists per μ, where these may be needed.
+    pub twists: Option<TwistCoefficients>,
 }
 
 /// Batches with the same table, or stored ones; with or without hanging slots.
@@ -67,6 +70,10 @@ pub(super) struct CellChunk {
     pub groups: Vec<Group>,
     /// Batches with tables.
     pub batches: Vec<SectorBatch>,
+    /// Their twists, where they have once mattered.
+    pub twists: Vec<TwistBatch>,
+    /// Whether these matter now.
+    pub twisted: bool,
     /// Batches with matrices of their own; their numbers follow.
     pub stored: Vec<StoredBatch<Lanes>>,
     /// Those in half precision, which come last.
@@ -94,6 +101,8 @@ impl CellChunk {
             x: Vec::new(),
             groups: Vec::new(),
             batches: Vec::new(),
+            twists: Vec::new(),
+            twisted: false,
             stored: Vec::new(),
             half: Vec::new(),
             lanes: Vec::new(),
@@ -116,7 +125,11 @@ impl CellChunk {
         let (first, first_weight) = (self.lanes.len(), self.weights.len());
         let packed = pack(ids, self.vertices.len());
         match matrix {
-            CellMatrix::Table(_) => self.batches.reserve_exact(packed.len()),
+            CellMatrix::Table(_) => {
+                self.batches.reserve_exact(packed.len());
+                // So that a step in which twists begin to matter allocates nothing.
+                self.twists.reserve_exact(self.batches.len() + packed.len());
+            }
             CellMatrix::Stored => self.stored.reserve_exact(packed.len()),
             CellMatrix::Half => self.half.reserve_exact(packed.len()),
         }
@@ -157,10 +170,19 @@ impl CellChunk {
         prefetch(self.batches.get(..batch::AHEAD).unwrap_or(&self.batches));
     }
 
-    /// y = s K̂ x; `x` has a row for every local number, and `y` perhaps more.
+    /// y = s K̂ x, `with_twists` where these matter; `x` has a row for every local number, and `y` perhaps more.
     #[inline(always)]
-    pub(super) fn apply(&self, simd: Simd, tables: &[Table], x: &[Padded], y: &mut [Padded]) {
+    pub(super) fn apply(
+        &self,
+        simd: Simd,
+        tables: &[Table],
+        with_twists: bool,
+        x: &[Padded],
+        y: &mut [Padded],
+    ) {
         assert!(x.len() == self.vertices.len());
+        let twisted = with_twists && self.twisted;
+        assert!(!twisted || self.twists.len() == self.batches.len());
         let y = &mut y[..x.len()];
         y.fill([0.0; 4]);
         for group in &self.groups {
@@ -171,7 +193,10 @@ impl CellChunk {
                 match group.matrix {
                     CellMatrix::Table(t) => {
                         let table = &tables[usize::from(t)].lanes;
-                        batch::multiply(simd, &self.batches[batches], weights, table, x, y);
+                        let twists = if twisted { &self.twists[batches.clone()] } else { &[] };
+                        let batches = &self.batches[batches];
+                        let cells = GroupCells { batches, twists, weights, table };
+                        batch::multiply(simd, cells, x, y);
                     }
                     CellMatrix::Stored => {
                         stored::multiply(simd, &self.stored[batches], weights, x, y);
@@ -199,7 +224,15 @@ impl CellChunk {
                 CellMatrix::Table(t) => {
                     let table = &tables[usize::from(t)].blocks;
                     // SAFETY: local numbers are indices into `vertices`, which is as long as `rows`.
-                    unsafe { blocks::add(simd, &self.batches[batches], hanging, table, rows) }
+                    unsafe { blocks::add(simd, &self.batches[batches.clone()], hanging, table, rows) }
+                    if self.twisted {
+                        blocks::add_twists(
+                            &self.batches[batches.clone()],
+                            &self.twists[batches],
+                            hanging,
+                            rows,
+                        );
+                    }
                 }
                 CellMatrix::Stored => self.add_stored(simd, &self.stored[batches], group, rows),
                 CellMatrix::Half => self.add_stored(simd, &self.half[batches], group, rows),
@@ -310,6 +343,7 @@ impl CellChunk {
             + size_of_val(&self.x[..])
             + size_of_val(&self.groups[..])
             + size_of_val(&self.batches[..])
+            + size_of_val(&self.twists[..])
             + size_of_val(&self.lanes[..])
             + size_of_val(&self.hanging[..])
             + size_of_val(&self.weights[..]);
@@ -318,7 +352,8 @@ impl CellChunk {
 
     /// Bytes that one application streams.
     pub(super) fn bytes(&self) -> usize {
-        self.batches.len() * size_of::<SectorBatch>()
+        let twist = if self.twisted { size_of::<TwistBatch>() } else { 0 };
+        self.batches.len() * (size_of::<SectorBatch>() + twist)
             + size_of_val(&self.stored[..])
             + size_of_val(&self.half[..])
             + self.weights.len() * size_of::<HangingWeights>()

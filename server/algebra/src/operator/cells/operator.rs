@@ -99,11 +99,11 @@ impl CellOperator {
     /// Replaces the tables; they keep their numbers.
     pub fn set_tables(&mut self, tables: &[SectorTable]) {
         self.tables.clear();
-        self.tables.extend(
-            tables
-                .iter()
-                .map(|table| Table { lanes: TableLanes::new(table), blocks: BlockTable::new(table) }),
-        );
+        self.tables.extend(tables.iter().map(|table| Table {
+            lanes: TableLanes::new(table),
+            blocks: BlockTable::new(table),
+            twists: None,
+        }));
     }
 
     /// Sets the factor c > 0 of every cell with a table; `of` gives it from the number of the cell.
@@ -250,11 +250,16 @@ impl CellOperator {
 
     /// First half of a product with `x`.
     pub fn multiply(&mut self, team: &mut Team, x: &[Padded]) {
+        self.multiply_chunks(team, x, true);
+    }
+
+    /// The same, `with_twists` or without.
+    pub(super) fn multiply_chunks(&mut self, team: &mut Team, x: &[Padded], with_twists: bool) {
         self.for_chunks(team, |simd, tables, chunk, y| {
             chunk.ask_for_first();
             let mut local = LocalVector::new();
             local.extend(chunk.vertices.iter().map(|&vertex| x[vertex as usize]));
-            chunk.apply(simd, tables, &local, y);
+            chunk.apply(simd, tables, with_twists, &local, y);
         });
     }
 
@@ -264,7 +269,7 @@ impl CellOperator {
             chunk.ask_for_first();
             chunk.room();
             gather_direction(&mut chunk.x, &chunk.vertices, z, beta);
-            chunk.apply(simd, tables, &chunk.x, y);
+            chunk.apply(simd, tables, true, &chunk.x, y);
         });
     }
 
@@ -312,7 +317,8 @@ impl CellOperator {
             for &(local, i) in &patch.locals[locals.clone()] {
                 local_x[local as usize] = x[i as usize];
             }
-            held.apply(*simd, tables, &local_x, &mut sums[gather.first_row[*chunk] as usize..]);
+            let y = &mut sums[gather.first_row[*chunk] as usize..];
+            held.apply(*simd, tables, true, &local_x, y);
         }
         for (y, ends) in y.iter_mut().zip(patch.first_row.windows(2)) {
             *y = [0.0; 4];

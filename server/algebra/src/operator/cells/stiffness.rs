@@ -8,14 +8,15 @@ use scindo_matter::material::Lame;
 use scindo_matter::octree::{Cell, Lattice, OUTSIDE, Octree};
 use scindo_matter::team::{Team, blocks, ranges};
 
-use super::super::stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
+use super::super::stiffness::{Direction, ElasticUpdate, Place, Stiffness, Tension, UpdateAt, apply};
 use super::super::tet_batch::Block6;
+use super::super::twist::TwistCoefficients;
 use super::super::{LinearOperator, OperatorChoice, Padded};
 use super::chunk::CellChunk;
 use super::lane::{CellLane, CellMatrix};
 use super::operator::{CellOperator, morton_order};
 use super::sectors::SectorTable;
-use super::update::RestChunk;
+use super::update::{CellTables, RestChunk};
 
 /// s K̂ of the cells of an octree, its internal forces and diagonal blocks. The law is linear or corotational with
 /// one rotation per cell.
@@ -32,6 +33,8 @@ pub struct CellStiffness {
     cells: Vec<Cell>,
     lattice: Lattice,
     materials: Materials,
+    /// Least density [kg/m³] of the regions, if there are any.
+    lightest: Option<f64>,
     /// Parameters of the last update.
     made_with: Option<ElasticUpdate>,
     /// Whether a cut arranged cells anew since then.
@@ -46,7 +49,8 @@ impl CellStiffness {
         let materials = Materials::new(materials);
         let (operator, rest) = arrange(simd, octree, &materials);
         let (cells, lattice) = (octree.cells().to_vec(), *octree.lattice());
-        Self { operator, rest, cells, lattice, materials, made_with: None, cut: false, version: 0 }
+        let lightest = octree.regions().iter().map(|region| region.density_kg_m3).reduce(f64::min);
+        Self { operator, rest, cells, lattice, materials, lightest, made_with: None, cut: false, version: 0 }
     }
 
     /// Bytes in use.
@@ -172,6 +176,20 @@ impl CellStiffness {
     }
 }
 
+impl CellStiffness {
+    /// Constants of twists for every table. Where regions differ in density, the least one counts.
+    fn set_twists(&mut self, with: &ElasticUpdate, tension: Option<&Tension<'_>>) {
+        let ratios = self.materials.ratios.iter().copied().chain([with.lame.lambda / with.lame.mu]);
+        for (table, lambda) in self.operator.tables.iter_mut().zip(ratios) {
+            table.twists = tension.map(|tension| {
+                let density = self.lightest.map_or(tension.density_kg_m3, |d| d.min(tension.density_kg_m3));
+                let s = tension.s / with.scale;
+                TwistCoefficients::new(Lame { mu: 1.0, lambda }, density, s, 1.0)
+            });
+        }
+    }
+}
+
 const NONE: u32 = u32::MAX;
 
 /// Rotations of some cells.
@@ -212,7 +230,13 @@ fn arrange(simd: Simd, octree: &Octree, materials: &Materials) -> (CellOperator,
 }
 
 impl Stiffness for CellStiffness {
-    fn update(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> usize {
+    fn update(
+        &mut self,
+        team: &mut Team,
+        with: &ElasticUpdate,
+        positions: &[Vector3<f64>],
+        tension: Option<&Tension<'_>>,
+    ) -> usize {
         let rotates = with.law.rotates();
         let same = self.made_with.is_some_and(|made| {
             (made.lame, made.scale, made.law.rotates()) == (with.lame, with.scale, rotates)
@@ -223,20 +247,21 @@ impl Stiffness for CellStiffness {
         }
         let same = same && !std::mem::take(&mut self.cut);
         self.version += u64::from(rotates || !same);
+        self.set_twists(with, tension.filter(|_| rotates));
         let CellOperator { simd, tables, chunks, gather, sums, diagonals, .. } = &mut self.operator;
-        let (simd, with) = (*simd, (&tables[..], with.scale as f32));
+        let (simd, with) = (*simd, CellTables { tables, scale: with.scale as f32 });
         let rows = (ranges(sums, &gather.first_row), ranges(diagonals, &gather.first_row));
         let (rest, lattice) = (&self.rest, &self.lattice);
         team.for_blocks((blocks(chunks, 1), rows), |k, (chunk, (f, diagonal))| {
             let (chunk, rest): (&mut CellChunk, &RestChunk) = (&mut chunk[0], &rest[k]);
             if rotates {
-                rest.update(simd, chunk, with, positions, f);
+                rest.update(simd, chunk, with, UpdateAt { positions, tension }, f);
             } else {
                 chunk.inverted = 0;
                 rest.linear_forces(simd, chunk, with, (positions, lattice), f);
             }
             if rotates || !same {
-                chunk.diagonals(simd, with.0, diagonal);
+                chunk.diagonals(simd, with.tables, diagonal);
             }
         });
         self.operator.chunks.iter().map(|chunk| chunk.inverted).sum()
@@ -260,6 +285,10 @@ impl Stiffness for CellStiffness {
 
     fn multiply(&mut self, team: &mut Team, x: &[Padded]) {
         self.operator.multiply(team, x);
+    }
+
+    fn multiply_damping(&mut self, team: &mut Team, x: &[Padded]) {
+        self.operator.multiply_chunks(team, x, false);
     }
 
     fn multiply_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32) {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use scindo_matter::element::{Simd, polar_rotation};
-use scindo_matter::material::{Lame, Law};
+use scindo_matter::material::{Corotational, Lame, Law};
 use scindo_matter::octree::{
     BoxShape, CutLink, LinkKey, OUTSIDE, Octree, OctreeSettings, Shape, corner_weights,
 };
@@ -11,7 +11,7 @@ use scindo_matter::team::{Team, blocks};
 use super::sectors::{diagonal_blocks, unit_stiffness};
 use super::*;
 use crate::operator::tet_batch::Block6;
-use crate::operator::{BLOCK, ElasticUpdate, LinearOperator, Padded, Stiffness};
+use crate::operator::{BLOCK, ElasticUpdate, LinearOperator, Padded, Stiffness, Tension};
 
 const SOFT: Lame = Lame { mu: 4e4, lambda: 9e4 };
 /// Another Poisson's ratio, and the same with another modulus.
@@ -96,7 +96,16 @@ struct Updated {
 fn updated(simd: Simd, threads: usize, octree: &Octree, law: Law, x: &[Vector3<f64>]) -> Updated {
     let mut stiffness = CellStiffness::new(simd, octree, &[HARD, HARDER]);
     let mut team = Team::new(threads).unwrap();
-    let inverted = stiffness.update(&mut team, &with(law), x);
+    let inverted = stiffness.update(&mut team, &with(law), x, None);
+    let (f, diagonal) = read(&stiffness, x.len());
+    Updated { stiffness, f, diagonal, inverted }
+}
+
+/// The same under the tension of the positions `at`, whose share of the stiffness is half.
+fn tense(simd: Simd, octree: &Octree, [x, at]: [&[Vector3<f64>]; 2], density_kg_m3: f64) -> Updated {
+    let mut stiffness = CellStiffness::new(simd, octree, &[HARD, HARDER]);
+    let tension = Tension { at, start: at, s: 0.5 * SCALE, density_kg_m3, damping: 0.0 };
+    let inverted = stiffness.update(&mut Team::new(2).unwrap(), &with(Law::Corotational), x, Some(&tension));
     let (f, diagonal) = read(&stiffness, x.len());
     Updated { stiffness, f, diagonal, inverted }
 }
@@ -142,6 +151,15 @@ impl Dense<'_> {
 
     /// Σ Wᵀ R K (Rᵀ W x − X) with X the corners of the cell about its centre, times `rest`.
     fn sum(&self, x: &[Vector3<f64>], rest: f64) -> Vec<Vector3<f64>> {
+        self.sum_with(x, rest, &self.rotations)
+    }
+
+    /// Σ Wᵀ R₁ K (Rᵀ W x − X) with other rotations R₁ of the forces.
+    fn sum_turned(&self, x: &[Vector3<f64>], to: &[Matrix3<f64>]) -> Vec<Vector3<f64>> {
+        self.sum_with(x, 1.0, to)
+    }
+
+    fn sum_with(&self, x: &[Vector3<f64>], rest: f64, to: &[Matrix3<f64>]) -> Vec<Vector3<f64>> {
         let mut y = vec![Vector3::zeros(); x.len()];
         self.for_cells(|id, W, K, R| {
             let (vertices, cell) = (self.octree.vertices()[id], &self.octree.cells()[id]);
@@ -158,9 +176,40 @@ impl Dense<'_> {
                     f[i] = (0..24).map(|s| K[3 * c + i][s] * local[s / 3][s % 3]).sum();
                 }
                 for v in 0..8 {
-                    y[vertices[v] as usize] += W[c][v] * (R * f);
+                    y[vertices[v] as usize] += W[c][v] * (to[id] * f);
                 }
             }
+        });
+        y
+    }
+
+    /// For every cell calls `visit` with its vertices, the mean gradients of their shape functions turned with the cell,
+    /// and Q̂ times half the volume, of stretches at the positions `at`.
+    fn for_twists(
+        &self,
+        at: &[Vector3<f64>],
+        mut visit: impl FnMut(&[u32; 8], &[Vector3<f64>; 8], Matrix3<f64>),
+    ) {
+        self.for_cells(|id, W, _, R| {
+            let (vertices, cell) = (&self.octree.vertices()[id], &self.octree.cells()[id]);
+            let side = f64::from(cell.side()) * self.octree.lattice().h;
+            let sign = |c: usize, k: usize| if c >> k & 1 == 1 { 0.25 / side } else { -0.25 / side };
+            let corner = |c: usize| Vector3::new(sign(c, 0), sign(c, 1), sign(c, 2));
+            let g: [Vector3<f64>; 8] = std::array::from_fn(|v| (0..8).map(|c| W[c][v] * corner(c)).sum());
+            let F: Matrix3<f64> = vertices.iter().zip(&g).map(|(&v, g)| at[v as usize] * g.transpose()).sum();
+            let law = Corotational([SOFT, HARD, HARDER][usize::from(cell.material)]);
+            let Q = 0.5 * side.powi(3) * R * law.twists(&F) * R.transpose();
+            visit(vertices, &g.map(|g| R * g), Q);
+        });
+    }
+
+    /// Half of Σ V (Q̂ w) × ĝ.
+    fn twists(&self, at: &[Vector3<f64>], u: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let mut y = vec![Vector3::zeros(); u.len()];
+        self.for_twists(at, |vertices, g, Q| {
+            let curl = vertices.iter().zip(g).map(|(&v, g)| g.cross(&u[v as usize]));
+            let w: Vector3<f64> = 0.5 * curl.sum::<Vector3<f64>>();
+            vertices.iter().zip(g).for_each(|(&v, g)| y[v as usize] += (Q * w).cross(g));
         });
         y
     }
@@ -443,18 +492,93 @@ fn the_stiffness_follows_a_cut_and_cells_keep_their_rotations() {
     }
     let x = deformed(&octree, 0.1, 0.0);
     let version = stiffness.version();
-    let inverted = stiffness.update(&mut team, &with(Law::Corotational), &x);
+    let inverted = stiffness.update(&mut team, &with(Law::Corotational), &x, None);
     let fresh = updated(Simd::detect(), 1, &octree, Law::Corotational, &x);
     assert_eq!(inverted, fresh.inverted);
     assert!(stiffness.version() > version);
     assert_eq!(read(&stiffness, x.len()), (fresh.f, fresh.diagonal));
     // The linear stiffness is made once.
-    stiffness.update(&mut team, &with(Law::Linear), &x);
+    stiffness.update(&mut team, &with(Law::Linear), &x, None);
     let version = stiffness.version();
     let first = read(&stiffness, x.len());
-    stiffness.update(&mut team, &with(Law::Linear), &x);
+    stiffness.update(&mut team, &with(Law::Linear), &x, None);
     assert_eq!((stiffness.version(), read(&stiffness, x.len())), (version, first));
     assert!(stiffness.places().iter().copied().all(|p| stiffness.rotation(p) == Matrix3::identity()));
+}
+
+#[test]
+fn tension_adds_the_twists_of_the_mean_gradient_but_not_to_damping() {
+    let mut team = Team::new(2).unwrap();
+    for octree in octrees() {
+        let (x, at) = (deformed(&octree, 0.1, 0.0), deformed(&octree, 0.05, 2.0));
+        let u = direction(x.len());
+        for simd in [Simd::Baseline, Simd::detect()] {
+            let plain = updated(simd, 1, &octree, Law::Corotational, &x);
+            let found = tense(simd, &octree, [&x, &at], 1e-3);
+            assert_eq!((plain.f, plain.inverted), (found.f, found.inverted));
+            let rotation = |place| plain.stiffness.rotation(place).map(f64::from);
+            let rotations = plain.stiffness.places().iter().copied().map(rotation).collect();
+            let dense = Dense { octree: &octree, rotations };
+            let wide_u: Vec<_> = u.iter().map(wide).collect();
+            let (mut exact, twists) = (dense.sum(&wide_u, 0.0), dense.twists(&at, &wide_u));
+            assert!(largest(twists.iter().copied()) > 0.01 * largest(exact.iter().copied()));
+            exact.iter_mut().zip(&twists).for_each(|(y, twist)| *y = SCALE * (*y + twist));
+            let mut y = vec![[0.0; 4]; x.len()];
+            let mut stiffness = found.stiffness;
+            stiffness.apply(&mut team, &u, &mut y);
+            assert!(error(&y, &exact) < 1e-5, "{simd:?}: {:e}", error(&y, &exact));
+            let (mut plain, mut damping) = (plain.stiffness, y.clone());
+            plain.apply(&mut team, &u, &mut y);
+            crate::operator::apply_damping(&mut stiffness, &mut team, &u, &mut damping);
+            assert_eq!(y, damping, "{simd:?}");
+            let mut blocks = dense.diagonals();
+            dense.for_twists(&at, |vertices, g, Q| {
+                for (&v, g) in vertices.iter().zip(g) {
+                    let cross = g.cross_matrix();
+                    blocks[v as usize] += 0.5 * cross.transpose() * Q * cross;
+                }
+            });
+            for (found, exact) in found.diagonal.iter().zip(&blocks) {
+                let [xx, xy, xz, _, yy, yz, zz, _] = found.map(f64::from);
+                let missing = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) - SCALE * exact;
+                assert!(missing.norm() < 1e-5 * SCALE * exact.norm(), "{simd:?}: {missing}");
+            }
+            // Heavy material does not need them.
+            let heavy = tense(simd, &octree, [&x, &at], 1e9);
+            assert_eq!(heavy.diagonal, read(&plain, x.len()).1);
+            assert_eq!(heavy.stiffness.operator().bytes(), plain.operator().bytes());
+        }
+    }
+}
+
+#[test]
+fn forces_of_damping_are_those_of_the_rate_of_strain_and_rotations_cause_none() {
+    let turn = Rotation3::new(Vector3::new(0.4, 1.1, -0.6));
+    for octree in octrees() {
+        let (x, start) = (deformed(&octree, 0.1, 0.0), deformed(&octree, 0.05, 2.0));
+        let turned: Vec<_> = x.iter().map(|x| turn * x).collect();
+        for simd in [Simd::Baseline, Simd::detect()] {
+            let damped = |start: &[Vector3<f64>]| {
+                let mut stiffness = CellStiffness::new(simd, &octree, &[HARD, HARDER]);
+                let tension = Tension { at: start, start, s: SCALE, density_kg_m3: 1e9, damping: 2.5 };
+                stiffness.update(&mut Team::new(2).unwrap(), &with(Law::Corotational), &x, Some(&tension));
+                read(&stiffness, x.len()).0
+            };
+            let rotations = |of: &CellStiffness| -> Vec<Matrix3<f64>> {
+                of.places().iter().copied().map(|place| of.rotation(place).map(f64::from)).collect()
+            };
+            let [now, before] = [&x, &start].map(|x| updated(simd, 1, &octree, Law::Corotational, x));
+            let dense = Dense { octree: &octree, rotations: rotations(&now.stiffness) };
+            // K (R₀ᵀ x₀ − X) of the start, turned by R instead of R₀.
+            let rigid = Dense { octree: &octree, rotations: rotations(&before.stiffness) };
+            let mut exact = dense.sum(&x, 1.0);
+            let of_start = rigid.sum_turned(&start, &dense.rotations);
+            exact.iter_mut().zip(of_start).for_each(|(f, start)| *f += 2.5 * (*f - start));
+            assert!(error(&damped(&start), &exact) < 2e-5, "{simd:?}: {:e}", error(&damped(&start), &exact));
+            let exact: Vec<_> = now.f.iter().map(wide).collect();
+            assert!(error(&damped(&turned), &exact) < 1e-5, "{simd:?}, turned");
+        }
+    }
 }
 
 #[test]
@@ -470,7 +594,7 @@ fn follow_cuts(law: Law) {
     let mut stiffness = CellStiffness::new(Simd::detect(), &octree, &[]);
     let bend = |X: &Vector3<f64>| X + 0.1 * Vector3::new((3.0 * X.y).sin(), X.z * X.z, (2.0 * X.x).cos());
     let x: Vec<_> = octree.rest_positions().iter().map(bend).collect();
-    stiffness.update(&mut team, &with(law), &x);
+    stiffness.update(&mut team, &with(law), &x, None);
     let cut = CutLink { at: [0.5; 2], normal: [Vector3::x(); 2], incision: 1 };
     for (axis, plane) in [(0, 9), (1, 20), (2, 15)] {
         let links = (0..20).flat_map(|s| {
@@ -489,7 +613,7 @@ fn follow_cuts(law: Law) {
         assert_eq!(places.len(), octree.cells().len());
         let turned = (stiffness.rotation(places[0]) - Matrix3::identity()).norm();
         assert!((turned > 1e-2) == law.rotates());
-        stiffness.update(&mut team, &with(law), &x);
+        stiffness.update(&mut team, &with(law), &x, None);
         let anew = updated(Simd::detect(), 1, &octree, law, &x);
         let (f, diagonal) = read(&stiffness, x.len());
         let exact: Vec<_> = anew.f.iter().map(wide).collect();

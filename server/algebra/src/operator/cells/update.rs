@@ -4,16 +4,18 @@
 
 use nalgebra::{Matrix3, Vector3};
 use scindo_matter::element::{
-    Batched, LANES, Lanes, Mat3, Simd, Vector8, for_eight, polar_newton, polar_rotation,
+    Batched, LANES, Lanes, Mat3, Simd, Vector, Vector8, for_eight, polar_newton, polar_rotation,
 };
 use scindo_matter::octree::{At, Lattice};
 use smallvec::SmallVec;
 
 use super::super::chunks::NO_PIECE;
+use super::super::stiffness::UpdateAt;
+use super::super::twist::{TwistBatch, TwistCoefficients, twist};
 use super::super::{Padded, padded};
 use super::batch::{
-    Corners, HangingWeights, SectorBatch, TableLanes, distribute, from_cell, interpolate, multiply_sectors,
-    part_of, read_matrix, read_weights, scatter, to_cell, transform,
+    Corners, HangingWeights, SectorBatch, distribute, from_cell, interpolate, multiply_sectors, part_of,
+    read_matrix, read_weights, scatter, to_cell, transform,
 };
 use super::chunk::{BatchLanes, CellChunk, LocalVector, MOST_VERTICES, Table};
 use super::lane::{CellMatrix, handedness};
@@ -61,25 +63,26 @@ impl RestChunk {
         Self { points: chunk.vertices.iter().map(|&v| points[v as usize]).collect(), sides: sides.collect() }
     }
 
-    /// Updates the rotations of `chunk` and writes the internal forces [N] of its vertices. `scale` is the s in
-    /// the factors of the cells.
+    /// Updates the rotations of `chunk` and writes the internal forces [N] of its vertices, and the twists at the
+    /// positions of the tension, where these matter.
     pub(super) fn update(
         &self,
         simd: Simd,
         chunk: &mut CellChunk,
-        (tables, scale): (&[Table], f32),
-        positions: &[Vector3<f64>],
+        with: CellTables<'_>,
+        at: UpdateAt<'_>,
         f: &mut [Padded],
     ) {
-        let mut local = Positions::new();
-        local.extend(chunk.vertices.iter().map(|&vertex| {
-            let x = &positions[vertex as usize];
-            [x.x, x.y, x.z, 0.0]
-        }));
+        let UpdateAt { positions, tension } = at;
+        let local = local_positions(chunk, positions);
+        let start = tension.filter(|tension| tension.damping > 0.0);
+        let start = start.map(|tension| (local_positions(chunk, tension.start), tension.damping as f32));
+        let start = start.as_ref().map(|(start, damping)| (&start[..], *damping));
         let f = &mut f[..chunk.vertices.len()];
         f.fill([0.0; 4]);
         assert!(local.len() == f.len());
-        chunk.inverted = 0;
+        (chunk.inverted, chunk.twisted) = (0, false);
+        let mut pulled = 0;
         for group in &chunk.groups {
             let CellMatrix::Table(t) = group.matrix else { continue };
             let range = group.batches.clone();
@@ -88,12 +91,44 @@ impl RestChunk {
                 lanes: &chunk.lanes[range.clone()],
                 sides: &self.sides[range],
                 weights: &chunk.weights[group.weights.clone()],
-                table: &tables[usize::from(t)].lanes,
-                per_scale: 1.0 / scale,
+                table: &with.tables[usize::from(t)],
+                per_scale: 1.0 / with.scale,
+                start,
+                pulled: 0,
             };
             // SAFETY: local numbers are indices into `vertices`, which is as long as `local` and `f`.
             chunk.inverted += unsafe { update(simd, &mut part, &local, f) };
+            pulled |= part.pulled;
         }
+        if let (true, Some(tension)) = (pulled != 0, tension) {
+            self.find_twists(simd, chunk, with.tables, tension.at);
+        }
+    }
+
+    /// Finds the twists of `chunk` at other `positions` than those of the update, and whether they matter.
+    fn find_twists(&self, simd: Simd, chunk: &mut CellChunk, tables: &[Table], positions: &[Vector3<f64>]) {
+        let local = local_positions(chunk, positions);
+        chunk.twists.resize(chunk.batches.len(), TwistBatch::default());
+        let mut matter = 0;
+        for group in &chunk.groups {
+            let CellMatrix::Table(t) = group.matrix else { continue };
+            let Some(c) = &tables[usize::from(t)].twists else { continue };
+            let range = group.batches.clone();
+            let (batches, sides) = (&chunk.batches[range.clone()], &self.sides[range.clone()]);
+            let weights = &chunk.weights[group.weights.clone()];
+            let twists = &mut chunk.twists[range];
+            // SAFETY: local numbers are indices into `vertices`, which is as long as `local`.
+            matter |= match simd {
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: both come from `Simd::detect` only.
+                Simd::Avx2 | Simd::Avx512 => unsafe {
+                    avx2::find_twists(batches, sides, weights, &local, c, twists)
+                },
+                // SAFETY: as above.
+                _ => unsafe { find_twists_with::<Lanes>(batches, sides, weights, &local, c, twists) },
+            };
+        }
+        chunk.twisted = matter != 0;
     }
 
     /// f = K u with displacements u relative to the chunk's first vertex, subtracted in double precision: the
@@ -102,7 +137,7 @@ impl RestChunk {
         &self,
         simd: Simd,
         chunk: &mut CellChunk,
-        (tables, scale): (&[Table], f32),
+        with: CellTables<'_>,
         (positions, lattice): (&[Vector3<f64>], &Lattice),
         f: &mut [Padded],
     ) {
@@ -110,10 +145,27 @@ impl RestChunk {
         let origin = if chunk.vertices.is_empty() { Vector3::zeros() } else { displacement(0) };
         let locals = (0..chunk.vertices.len()).map(|k| padded(&(displacement(k) - origin)));
         let local: LocalVector = locals.collect();
-        chunk.apply(simd, tables, &local, f);
-        let factor = 1.0 / scale;
+        chunk.apply(simd, with.tables, false, &local, f);
+        let factor = 1.0 / with.scale;
         f[..local.len()].as_flattened_mut().iter_mut().for_each(|f| *f *= factor);
     }
+}
+
+/// Tables of the cells, and the s in their factors.
+#[derive(Clone, Copy)]
+pub(super) struct CellTables<'a> {
+    pub tables: &'a [Table],
+    pub scale: f32,
+}
+
+/// Positions of the vertices of a chunk.
+fn local_positions(chunk: &CellChunk, positions: &[Vector3<f64>]) -> Positions {
+    let mut local = Positions::new();
+    local.extend(chunk.vertices.iter().map(|&vertex| {
+        let x = &positions[vertex as usize];
+        [x.x, x.y, x.z, 0.0]
+    }));
+    local
 }
 
 /// The batches of one group.
@@ -122,9 +174,13 @@ struct Part<'a> {
     lanes: &'a [BatchLanes],
     sides: &'a [RestBatch],
     weights: &'a [HangingWeights],
-    table: &'a TableLanes,
+    table: &'a Table,
     /// 1/s.
     per_scale: f32,
+    /// Positions where the step starts, and β/h, if the forces contain those of damping.
+    start: Option<(&'a [[f64; 4]], f32)>,
+    /// Out: lanes so stretched that their twists may matter.
+    pulled: u16,
 }
 
 /// Returns the number of cells with det F ≤ 0.
@@ -160,36 +216,34 @@ unsafe fn update_with<V: Batched<N>, const N: usize>(
     let (lanes, sides) = (part.lanes[first..].as_chunks().0, part.sides[first..].as_chunks().0);
     let weights = part.weights.get(first..).unwrap_or_default().as_chunks().0;
     for (b, ((batch, lanes), side)) in batches.iter_mut().zip(lanes).zip(sides).enumerate() {
-        let mut u: Corners<V> = [[V::splat(0.0); 8]; 3];
-        for_eight!(j => {
-            if j > 0 {
-                // SAFETY: the caller's promise.
-                let edge = unsafe { V::gather_all_edges(x, batch, |batch| [&batch.nodes[0], &batch.nodes[j]]) };
-                (u[0][j], u[1][j], u[2][j]) = (edge[0], edge[1], edge[2]);
-            }
-        });
         let weights: Option<&[HangingWeights; N]> = weights.get(b);
-        if let Some(weights) = weights {
-            interpolate(&mut u, &read_weights(weights));
-        }
-        transform(&mut u);
-        // F̂ = δ F D: column k is the difference across axis k.
+        // SAFETY: the caller's promise.
+        let mut u: Corners<V> = unsafe { transformed(batch, weights, x) };
         let inverse = V::read(side, |side: &RestBatch| &side.inverse);
-        let mut F = [inverse; 9];
-        for i in 0..3 {
-            for k in 0..3 {
-                F[3 * i + k] = inverse * u[i][1 << k];
-            }
-        }
+        let F = mean_gradient(&u, inverse);
         inverted += rotate(&F, batch, lanes);
         // R̂ᵀ x − X in the frame of the cell, then as in a product.
         let R = read_matrix(batch, |batch| &batch.rotation);
         to_cell(&mut u, &R);
         let rest = V::read(batch, |batch| &batch.root) * V::read(side, |side| &side.span);
-        for k in 0..3 {
-            u[k][1 << k] = u[k][1 << k] + rest;
+        add_rest(&mut u, rest);
+        if let Some(twists) = &part.table.twists {
+            part.pulled |= pulled(&u, inverse, V::read(batch, |batch| &batch.root), twists);
         }
-        multiply_sectors(&mut u, part.table);
+        if let Some((start, damping)) = part.start {
+            // SAFETY: the caller's promise, and `start` is as long as `x`.
+            let mut before: Corners<V> = unsafe { transformed(batch, weights, start) };
+            let F = mean_gradient(&before, inverse);
+            to_cell(&mut before, &rotation_of(&F, batch, lanes));
+            add_rest(&mut before, rest);
+            let rate = V::splat(damping);
+            for i in 0..3 {
+                for_eight!(p => {
+                    u[i][p] = rate.mul_add(u[i][p] - before[i][p], u[i][p]);
+                });
+            }
+        }
+        multiply_sectors(&mut u, &part.table.lanes);
         from_cell(&mut u, &R);
         let per_scale = V::splat(part.per_scale);
         for i in 0..3 {
@@ -207,6 +261,120 @@ unsafe fn update_with<V: Batched<N>, const N: usize>(
         }
     }
     inverted
+}
+
+/// Takes the edges of the cell away, which lie in the patterns that are linear along one axis.
+#[inline(always)]
+fn add_rest<V: Vector>(u: &mut Corners<V>, rest: V) {
+    for k in 0..3 {
+        u[k][1 << k] = u[k][1 << k] + rest;
+    }
+}
+
+/// û at the positions `x`, relative to those of slot 0.
+///
+/// # Safety
+/// All local numbers are below the length of `x`.
+#[inline(always)]
+unsafe fn transformed<V: Batched<N>, const N: usize>(
+    batch: &[SectorBatch; N],
+    weights: Option<&[HangingWeights; N]>,
+    x: &[[f64; 4]],
+) -> Corners<V> {
+    let mut u: Corners<V> = [[V::splat(0.0); 8]; 3];
+    for_eight!(j => {
+        if j > 0 {
+            // SAFETY: the caller's promise.
+            let edge = unsafe { V::gather_all_edges(x, batch, |batch| [&batch.nodes[0], &batch.nodes[j]]) };
+            (u[0][j], u[1][j], u[2][j]) = (edge[0], edge[1], edge[2]);
+        }
+    });
+    if let Some(weights) = weights {
+        interpolate(&mut u, &read_weights(weights));
+    }
+    transform(&mut u);
+    u
+}
+
+/// F̂ = δ F D: column k is the difference across axis k.
+#[inline(always)]
+fn mean_gradient<V: Vector>(u: &Corners<V>, inverse: V) -> Mat3<V> {
+    let mut F = [inverse; 9];
+    for i in 0..3 {
+        for k in 0..3 {
+            F[3 * i + k] = inverse * u[i][1 << k];
+        }
+    }
+    F
+}
+
+/// Lanes whose twists may matter, by the strain at the predictor: û is √c times that over `inverse`.
+#[inline(always)]
+fn pulled<V: Vector>(u: &Corners<V>, inverse: V, root: V, twists: &TwistCoefficients) -> u16 {
+    let half = inverse * V::splat(0.5);
+    let strain = [
+        inverse * u[0][1],
+        half * (u[0][2] + u[1][1]),
+        half * (u[0][4] + u[2][1]),
+        inverse * u[1][2],
+        half * (u[1][4] + u[2][2]),
+        inverse * u[2][4],
+    ];
+    twists.matters(twists.bound(&strain), root, sharpness(inverse, root))
+}
+
+/// c/a³ of cells of side a.
+#[inline(always)]
+fn sharpness<V: Vector>(inverse: V, root: V) -> V {
+    let per_side = V::splat(4.0) * inverse.max(-inverse);
+    root * root * per_side * per_side * per_side
+}
+
+/// Finds the twists at the positions `x`. Returns the lanes in which they matter.
+///
+/// # Safety
+/// All local numbers are below the length of `x`.
+#[inline(always)]
+unsafe fn find_twists_with<V: Vector8>(
+    batches: &[SectorBatch],
+    sides: &[RestBatch],
+    weights: &[HangingWeights],
+    x: &[[f64; 4]],
+    c: &TwistCoefficients,
+    twists: &mut [TwistBatch],
+) -> u16 {
+    let (batches, sides) = (batches.as_chunks::<1>().0, sides.as_chunks::<1>().0);
+    let (weights, twists) = (weights.as_chunks::<1>().0, twists.as_chunks_mut::<1>().0);
+    let (one, factor) = (V::splat(1.0), V::splat(c.cell_factor()));
+    let mut matter = 0;
+    for (b, ((batch, side), to)) in batches.iter().zip(sides).zip(twists).enumerate() {
+        // SAFETY: the caller's promise.
+        let u: Corners<V> = unsafe { transformed(batch, weights.get(b), x) };
+        let inverse = V::read(side, |side: &RestBatch| &side.inverse);
+        let F = mean_gradient(&u, inverse);
+        let (Q, most) = twist(&[[F[0], F[1], F[2]], [F[3], F[4], F[5]], [F[6], F[7], F[8]]], c);
+        for i in 0..6 {
+            (factor * Q[i]).write(to, |to: &mut TwistBatch| &mut to.q[i]);
+        }
+        matter |= c.matters(most, one, sharpness(inverse, V::read(batch, |batch| &batch.root)));
+    }
+    matter
+}
+
+/// √c R̂ of other gradients than those of the last update.
+#[inline(always)]
+fn rotation_of<V: Batched<N>, const N: usize>(
+    F: &Mat3<V>,
+    batches: &mut [SectorBatch; N],
+    lanes: &[BatchLanes; N],
+) -> Mat3<V> {
+    let held: Mat3<V> = read_matrix(batches, |batch| &batch.rotation);
+    rotate(F, batches, lanes);
+    let found = read_matrix(batches, |batch| &batch.rotation);
+    for i in 0..9 {
+        held[i].write(batches, |batch| &mut batch.rotation[i]);
+    }
+    found
 }
 
 /// Updates the rotation of every used lane; returns how many have det F ≤ 0.
@@ -269,8 +437,23 @@ fn rotate_guarded(
 mod avx2 {
     //! The same loop compiled for AVX2 and FMA.
 
-    use super::{Padded, Part};
+    use super::{HangingWeights, Padded, Part, RestBatch, SectorBatch, TwistBatch, TwistCoefficients};
     use scindo_matter::element::avx2::Register;
+
+    /// # Safety
+    /// As for [`super::find_twists_with`].
+    #[target_feature(enable = "avx2,fma")]
+    pub(super) unsafe fn find_twists(
+        batches: &[SectorBatch],
+        sides: &[RestBatch],
+        weights: &[HangingWeights],
+        x: &[[f64; 4]],
+        c: &TwistCoefficients,
+        twists: &mut [TwistBatch],
+    ) -> u16 {
+        // SAFETY: the caller's promise.
+        unsafe { super::find_twists_with::<Register>(batches, sides, weights, x, c, twists) }
+    }
 
     /// # Safety
     /// As for [`super::update`].

@@ -36,7 +36,7 @@ impl LinearStep {
         self.searched = None;
         self.delta.fill([0.0; 4]);
         self.translations.restart(inputs.step.parts);
-        self.update_operator(team, &mut **elastic, state, inputs)
+        self.update_operator(team, &mut **elastic, state, true, inputs)
     }
 
     /// Completes the operator of a pass. `shared` are the nodes of springs to other bodies, ascending, with their
@@ -141,7 +141,7 @@ impl LinearStep {
         if !inputs.step.parts.any_free() {
             return;
         }
-        self.gather_imbalance(state, inputs);
+        self.gather_imbalance(state, inputs, true);
         let (parts, translations) = (inputs.step.parts, &self.translations);
         for part in (0..parts.len()).filter(|&part| parts.free[part]) {
             let (S, b) = translations.equation(part);

@@ -13,6 +13,8 @@ pub struct Ablation {
     pub predictor: bool,
     /// The fast path bounds friction by the normal force of the last step instead of that at the end of this one.
     pub lagged_friction: bool,
+    /// The fast path's stiffness under tension is that of relaxed material.
+    pub twists: bool,
     /// Newton's method takes every full step, even if the potential rises.
     pub line_search: bool,
     /// Coarse levels of multigrid do not see cuts inside their cells. Cases apply this themselves.
