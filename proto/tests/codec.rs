@@ -293,6 +293,7 @@ fn stats() -> impl Strategy<Value = Stats> {
             unconverged: d % 2 == 0,
             divided_cells: a.into(),
             joined_cells: b.into(),
+            unbalanced_steps: c.into(),
         }],
         tools: vec![ToolStats {
             tool_id: id,

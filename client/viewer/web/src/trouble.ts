@@ -4,7 +4,7 @@ import type { BodyStats } from "../gen/scindo/v1/server_pb";
 import { count, exponent } from "./units";
 
 export interface Trouble {
-  kind: "error" | "refused" | "divided" | "rolled-back" | "inverted" | "missed";
+  kind: "error" | "refused" | "divided" | "rolled-back" | "inverted" | "unbalanced" | "missed";
   /** Text for the header of the page, after the body's name. Empty for problems that only the panel shows. */
   short: string;
   /** Text for the panel. */
@@ -18,6 +18,9 @@ export function troubles(body: BodyStats): Trouble[] {
     say("refused", "refuses steps", `${many(body.refusedSteps, "step")} refused; the body stood still in them`);
   }
   if (body.inverted > 0) say("inverted", "is inverted", `${many(body.inverted, "element")} inverted: the result is wrong there`);
+  if (body.unbalancedSteps > 0n) {
+    say("unbalanced", "shakes", `energy came from nowhere ${many(body.unbalancedSteps, "time")}: the body may shake; a shorter step helps`);
+  }
   if (body.unconverged && !body.fixedIterations) {
     say("error", "does not converge", `the solver stopped above its tolerance: residual ${exponent(body.residual)}, tolerance ${exponent(body.tolerance)}`);
   }

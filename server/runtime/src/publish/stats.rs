@@ -96,6 +96,7 @@ pub fn body_stats(body: &BodySnapshot) -> BodyStats {
         unconverged: body.unconverged,
         divided_cells: body.adapted.divided,
         joined_cells: body.adapted.joined,
+        unbalanced_steps: body.counts.unbalanced,
     }
 }
 

@@ -14,6 +14,10 @@ const CALM: u64 = 50;
 /// Share of unconverged steps above which the run as a whole counts as failed.
 const MOSTLY: f64 = 0.5;
 
+/// Share of steps found unbalanced above which the run counts as failed. Energy is looked at in one of sixteen steps, and
+/// 64 careful steps follow.
+const RARELY: f64 = 0.005;
+
 /// Steps of one body, counted by what went wrong in them. One step may count in several fields.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StepCounts {
@@ -29,6 +33,8 @@ pub struct StepCounts {
     pub rolled_back: u64,
     /// Steps that ended with inverted elements.
     pub inverted: u64,
+    /// Steps after which energy had come from nowhere.
+    pub unbalanced: u64,
     /// Largest residual of the unconverged steps, relative to their reference.
     pub worst_residual: f64,
     /// Most parts into which a step was divided.
@@ -45,11 +51,12 @@ enum Trouble {
     Divided,
     RolledBack,
     Inverted,
+    Unbalanced,
 }
 
 impl Trouble {
-    const ALL: [Self; 5] =
-        [Self::Unconverged, Self::Refused, Self::Divided, Self::RolledBack, Self::Inverted];
+    const ALL: [Self; 6] =
+        [Self::Unconverged, Self::Refused, Self::Divided, Self::RolledBack, Self::Inverted, Self::Unbalanced];
 
     /// Name of its events in the report.
     fn name(self) -> &'static str {
@@ -59,13 +66,14 @@ impl Trouble {
             Self::Divided => "step-divided",
             Self::RolledBack => "step-rolled-back",
             Self::Inverted => "elements-inverted",
+            Self::Unbalanced => "step-unbalanced",
         }
     }
 
     fn level(self) -> Level {
         match self {
             Self::Refused | Self::RolledBack => Level::Error,
-            Self::Unconverged | Self::Divided | Self::Inverted => Level::Warning,
+            Self::Unconverged | Self::Divided | Self::Inverted | Self::Unbalanced => Level::Warning,
         }
     }
 
@@ -77,6 +85,7 @@ impl Trouble {
             Self::Divided => solve.is_divided(),
             Self::RolledBack => solve.outcome == Outcome::Held,
             Self::Inverted => solve.inverted_pieces > 0,
+            Self::Unbalanced => solve.is_unbalanced(),
         }
     }
 
@@ -99,6 +108,7 @@ impl Trouble {
                 ),
             },
             Self::Inverted => format!("{} elements are inverted", solve.inverted_pieces),
+            Self::Unbalanced => solve.notice.map_or_else(String::new, |why| why.to_string()),
         }
     }
 
@@ -110,6 +120,7 @@ impl Trouble {
             Self::Divided => "were divided",
             Self::RolledBack => "were rolled back",
             Self::Inverted => "contained inverted elements",
+            Self::Unbalanced => "gained energy from nowhere",
         }
     }
 }
@@ -134,7 +145,7 @@ struct Spell {
 pub(crate) struct Watch {
     /// Counts since the start or the last reset.
     pub counts: StepCounts,
-    spells: [Spell; 5],
+    spells: [Spell; 6],
     /// Why the first refused step was refused.
     refused_for: Option<Notice>,
     /// How far the first step that left every sensible range would have gone.
@@ -187,6 +198,7 @@ impl Watch {
             &mut counts.divided,
             &mut counts.rolled_back,
             &mut counts.inverted,
+            &mut counts.unbalanced,
         ]) {
             *count += u64::from(trouble.is_in(solve));
         }
@@ -232,6 +244,13 @@ impl Watch {
                 self.counts.most_parts
             ));
         }
+        if self.counts.unbalanced > 0 {
+            add(format!(
+                "energy came from nowhere {} times in {steps} steps: forces were not in balance at their ends, and the \
+                 body may shake for ever; take a shorter world.step_s (half of it doubles the cost)",
+                self.counts.unbalanced
+            ));
+        }
         // The present state counts too, even if no step was counted as inverted.
         let least = body.least_volume_ratio();
         if inverted > 0 || least <= 0.0 {
@@ -268,6 +287,9 @@ impl Watch {
         }
         if rolled_back > 0 {
             reasons.push(format!("{rolled_back} of {steps} steps were rolled back"));
+        }
+        if self.counts.unbalanced as f64 > RARELY * steps as f64 {
+            reasons.push("forces were not in balance at the ends of many steps".into());
         }
         if !fixed && unconverged as f64 > MOSTLY * steps as f64 {
             reasons.push(format!("{unconverged} of {steps} steps did not converge"));

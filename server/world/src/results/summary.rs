@@ -211,6 +211,8 @@ pub struct SolverSummary {
     pub rolled_back_steps: u64,
     /// Steps that held inverted elements.
     pub inverted_steps: u64,
+    /// Steps after which energy had come from nowhere.
+    pub unbalanced_steps: u64,
 }
 
 /// A probe at the end.
@@ -353,6 +355,7 @@ impl Running {
             solver.divided_steps += u64::from(solve.is_divided());
             solver.rolled_back_steps += u64::from(solve.outcome == Outcome::Held);
             solver.inverted_steps += u64::from(solve.inverted_pieces > 0);
+            solver.unbalanced_steps += u64::from(solve.is_unbalanced());
         }
         self.event_count += report.events.len() as u64;
         let room = MAX_EVENTS.saturating_sub(self.events.len());

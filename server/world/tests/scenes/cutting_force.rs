@@ -60,15 +60,15 @@ struct Course {
 
 fn run(text: &str, seconds: f64) -> Course {
     let mut sim = start(text);
-    let (mut work, mut steps, mut last) = (0.0, Vec::new(), None);
+    let (mut work, mut steps, mut last) = (0.0, Vec::new(), None::<(Vector3<f64>, Vector3<f64>)>);
     for _ in 0..(seconds / 0.005).round() as usize {
         sim.step(&Inputs::default());
         let tool = sim.tools().iter().next().unwrap();
         let at = tool.pose.translation.vector;
-        if let Some(last) = last {
-            work -= tool.force_n.dot(&(at - last));
+        if let Some((from, force_n)) = last {
+            work -= 0.5 * (tool.force_n + force_n).dot(&(at - from));
         }
-        last = Some(at);
+        last = Some((at, tool.force_n));
         steps.push((tool.force_n, sim.bodies()[0].body.n_copies()));
     }
     Course { sim, work, steps }

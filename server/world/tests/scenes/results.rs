@@ -145,7 +145,9 @@ fn the_summary_tells_who_touched_whom() {
         .collect();
     assert_eq!(rows.len() as u64, loose["steps"].as_u64().unwrap());
     let last = rows.last().unwrap();
-    assert_eq!((&last[0], last[9].parse::<f64>().unwrap()), ("150", carried));
+    // Numbers of JSON are read to the last digit but one.
+    let written = last[9].parse::<f64>().unwrap();
+    assert!(&last[0] == "150" && (written / carried - 1.0).abs() < 1e-15, "{last:?}: {carried}");
     assert_eq!(last[5].parse::<u64>().unwrap(), loose["contacts"].as_u64().unwrap());
 }
 

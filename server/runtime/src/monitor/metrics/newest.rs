@@ -46,11 +46,12 @@ const BODY: [Column<BodyStats>; 6] = [
 type Kind = (&'static str, fn(&BodyStats) -> u64);
 
 /// Kinds of steps that did not go as asked, by their label.
-const STEPS: [Kind; 4] = [
+const STEPS: [Kind; 5] = [
     ("unconverged", |b| b.unconverged_steps),
     ("refused", |b| b.refused_steps),
     ("divided", |b| b.divided_steps),
     ("rolled-back", |b| b.rolled_back_steps),
+    ("unbalanced", |b| b.unbalanced_steps),
 ];
 
 /// Gauges of a tool.

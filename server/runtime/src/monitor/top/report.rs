@@ -28,6 +28,7 @@ fn of_body(body: &BodyStats) -> Value {
         "elements": body.elements, "copies": body.copies, "epoch": body.epoch, "inverted": body.inverted,
         "unconverged_steps": body.unconverged_steps, "refused_steps": body.refused_steps,
         "divided_steps": body.divided_steps, "rolled_back_steps": body.rolled_back_steps,
+        "unbalanced_steps": body.unbalanced_steps,
     })
 }
 

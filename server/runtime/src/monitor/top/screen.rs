@@ -82,8 +82,13 @@ fn draw_stages(frame: &mut Frame<'_>, area: Rect, view: &View, stats: &Stats) {
 
 fn draw_bodies(frame: &mut Frame<'_>, area: Rect, bodies: &[BodyStats]) {
     let row = |body: &BodyStats| {
-        let troubled =
-            [body.unconverged_steps, body.refused_steps, body.divided_steps, body.rolled_back_steps];
+        let troubled = [
+            body.unconverged_steps,
+            body.refused_steps,
+            body.divided_steps,
+            body.rolled_back_steps,
+            body.unbalanced_steps,
+        ];
         let row = Row::new([
             body.body_id.clone(),
             body.elements.to_string(),
@@ -97,7 +102,7 @@ fn draw_bodies(frame: &mut Frame<'_>, area: Rect, bodies: &[BodyStats]) {
         if (body.unconverged && !body.fixed_iterations) || body.inverted > 0 { row.yellow() } else { row }
     };
     let titles =
-        ["body", "elements", "copies", "iterations", "residual", "inverted", "unconv refused div back"];
+        ["body", "elements", "copies", "iterations", "residual", "inverted", "unconv refused div back unbal"];
     table(frame, area, &titles, bodies.iter().map(row));
 }
 
