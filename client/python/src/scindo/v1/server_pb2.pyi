@@ -196,7 +196,7 @@ class StageTime(_message.Message):
     def __init__(self, name: _Optional[str] = ..., milliseconds: _Optional[float] = ...) -> None: ...
 
 class BodyStats(_message.Message):
-    __slots__ = ("body_id", "iterations", "residual", "elements", "pieces", "copies", "epoch", "volume_m3", "tolerance", "unconverged_steps", "refused_steps", "divided_steps", "rolled_back_steps", "inverted", "fixed_iterations", "unconverged", "divided_cells", "joined_cells")
+    __slots__ = ("body_id", "iterations", "residual", "elements", "pieces", "copies", "epoch", "volume_m3", "tolerance", "unconverged_steps", "refused_steps", "divided_steps", "rolled_back_steps", "inverted", "fixed_iterations", "unconverged", "divided_cells", "joined_cells", "unbalanced_steps")
     BODY_ID_FIELD_NUMBER: _ClassVar[int]
     ITERATIONS_FIELD_NUMBER: _ClassVar[int]
     RESIDUAL_FIELD_NUMBER: _ClassVar[int]
@@ -215,6 +215,7 @@ class BodyStats(_message.Message):
     UNCONVERGED_FIELD_NUMBER: _ClassVar[int]
     DIVIDED_CELLS_FIELD_NUMBER: _ClassVar[int]
     JOINED_CELLS_FIELD_NUMBER: _ClassVar[int]
+    UNBALANCED_STEPS_FIELD_NUMBER: _ClassVar[int]
     body_id: str
     iterations: int
     residual: float
@@ -233,7 +234,8 @@ class BodyStats(_message.Message):
     unconverged: bool
     divided_cells: int
     joined_cells: int
-    def __init__(self, body_id: _Optional[str] = ..., iterations: _Optional[int] = ..., residual: _Optional[float] = ..., elements: _Optional[int] = ..., pieces: _Optional[int] = ..., copies: _Optional[int] = ..., epoch: _Optional[int] = ..., volume_m3: _Optional[float] = ..., tolerance: _Optional[float] = ..., unconverged_steps: _Optional[int] = ..., refused_steps: _Optional[int] = ..., divided_steps: _Optional[int] = ..., rolled_back_steps: _Optional[int] = ..., inverted: _Optional[int] = ..., fixed_iterations: _Optional[bool] = ..., unconverged: _Optional[bool] = ..., divided_cells: _Optional[int] = ..., joined_cells: _Optional[int] = ...) -> None: ...
+    unbalanced_steps: int
+    def __init__(self, body_id: _Optional[str] = ..., iterations: _Optional[int] = ..., residual: _Optional[float] = ..., elements: _Optional[int] = ..., pieces: _Optional[int] = ..., copies: _Optional[int] = ..., epoch: _Optional[int] = ..., volume_m3: _Optional[float] = ..., tolerance: _Optional[float] = ..., unconverged_steps: _Optional[int] = ..., refused_steps: _Optional[int] = ..., divided_steps: _Optional[int] = ..., rolled_back_steps: _Optional[int] = ..., inverted: _Optional[int] = ..., fixed_iterations: _Optional[bool] = ..., unconverged: _Optional[bool] = ..., divided_cells: _Optional[int] = ..., joined_cells: _Optional[int] = ..., unbalanced_steps: _Optional[int] = ...) -> None: ...
 
 class ToolStats(_message.Message):
     __slots__ = ("tool_id", "owner", "contact_rate_hz", "pose_rate_hz", "force_n", "contact_age_ms", "pose_age_ms", "name")
