@@ -145,9 +145,9 @@ fn the_summary_tells_who_touched_whom() {
         .collect();
     assert_eq!(rows.len() as u64, loose["steps"].as_u64().unwrap());
     let last = rows.last().unwrap();
-    // Numbers of JSON are read to the last digit but one.
-    let written = last[9].parse::<f64>().unwrap();
-    assert!(&last[0] == "150" && (written / carried - 1.0).abs() < 1e-15, "{last:?}: {carried}");
+    // Both files have the same digits; the reader of JSON may lose the last one.
+    assert!(&last[0] == "150" && text.contains(&last[9]), "{last:?}: {carried}");
+    assert!((last[9].parse::<f64>().unwrap() / carried - 1.0).abs() < 1e-15);
     assert_eq!(last[5].parse::<u64>().unwrap(), loose["contacts"].as_u64().unwrap());
 }
 
