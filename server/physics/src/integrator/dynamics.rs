@@ -138,8 +138,9 @@ impl Dynamics {
         self.solver.follow_cut(team, space)
     }
 
-    /// Follows `state`, whose strains of springs were changed from outside.
+    /// Follows `state`, which was changed from outside, strains of springs included.
     pub fn follow_viscous(&mut self, team: &mut Team, state: &State) {
+        self.course.balance.forget();
         self.solver.follow_viscous(team, state);
     }
 
