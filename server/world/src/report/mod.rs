@@ -98,7 +98,9 @@ impl StepReport {
             let message = "the step was interrupted by a command; the body is as before the step".into();
             self.tell(Level::Warning, "step-interrupted", body, message);
         }
-        if let (Outcome::Advanced, Some(notice), true) = (solve.outcome, solve.notice, begins) {
+        // Unbalanced steps have an event of their own.
+        let notice = solve.notice.filter(|_| begins && !solve.is_unbalanced());
+        if let (Outcome::Advanced, Some(notice)) = (solve.outcome, notice) {
             let meant = matches!(notice, Notice::Started | Notice::Divided { .. });
             let level = if meant { Level::Info } else { Level::Warning };
             self.tell(level, "step-notice", body, notice.to_string());
