@@ -21,7 +21,9 @@
 //! the stress of β (ε(x̂) − ε(x))/h. In BDF2 and Newmark's method the expansions of a steady turn cancel.
 
 mod coarse;
+mod commit;
 mod equilibrium;
+mod operator;
 mod spring_terms;
 pub(super) mod together;
 
@@ -29,13 +31,12 @@ use coarse::two_level;
 use nalgebra::{Matrix3, Vector3};
 use scindo_algebra::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, LinearOperator, Padded, Spring, StiffModes, Stiffness,
-    Substitution, Sum, SystemOperator, Tension, apply_damping, block_of, filter, invert, invert_free, padded,
-    unpadded,
+    Substitution, Sum, SystemOperator, apply_damping, block_of, filter, padded, unpadded,
 };
 use scindo_algebra::solver::multigrid::{CoarsestSolve, CycleShape, Hierarchy, LevelReport, Multigrid};
 use scindo_algebra::solver::two_level::CoarseSpace;
 use scindo_algebra::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
-use scindo_matter::element::{FixedCopy, Held};
+use scindo_matter::element::Held;
 use scindo_matter::material::Rayleigh;
 use scindo_matter::octree::Octree;
 use scindo_matter::storage::reserve::resize_reserving;
@@ -55,9 +56,9 @@ use super::step_inputs::{Inertia, KnownLoads, LinearInputs, Predictor, StepOutco
 /// Part of the residual that a solve leaves on the way to an equilibrium of a law that rotates, at most; the last
 /// one reaches the tolerance.
 const FORCING: f64 = 0.1;
-/// The equations of a step in motion hold once their residual is this many times the tolerance of its linear solves, or
-/// so small that forces in single precision tell no more of it.
+/// The equations of a step in motion hold once their residual is this many times the tolerance of its linear solves.
 const EQUATIONS: f64 = 10.0;
+/// They hold with this residual in any case: forces in single precision tell no more of it.
 const LEAST_RESIDUAL: f64 = 1e-5;
 /// Largest number of passes of a linear solve, repeated while springs open, close, slip or reach their cap.
 const SPRING_PASSES: usize = 8;
@@ -426,157 +427,6 @@ impl LinearStep {
         }
     }
 
-    /// Updates rotations, forces, gradients and damping at the predictor, and twists at `state` or, in further solves,
-    /// at the predictor too. Returns the number of inverted pieces.
-    fn update_operator(
-        &mut self,
-        team: &mut Team,
-        elastic: &mut dyn Stiffness,
-        state: &State,
-        first: bool,
-        inputs: &LinearInputs<'_>,
-    ) -> usize {
-        team.begin(Phase::Operator);
-        let (h, beta) = (inputs.step.h, inputs.material.rayleigh.stiffness_s);
-        let with = inputs.elastic_update();
-        let scale = with.scale;
-        let at = if self.ablation.predictor { &state.x } else { &self.predicted };
-        let tension = Tension {
-            at: if first { &state.x } else { &self.predicted },
-            start: &state.x,
-            s: inputs.s(),
-            density_kg_m3: if inputs.moves() { inputs.material.density_kg_m3 } else { 0.0 },
-            damping: if self.damps_by_strain(inputs) { beta / h } else { 0.0 },
-        };
-        let inverted = elastic.update(team, &with, at, (!self.ablation.twists).then_some(&tension));
-        self.sum_chunks(team, elastic, inputs);
-        // Without inertia, single-precision forces would be too coarse for the residual.
-        if !inputs.moves() {
-            self.exact.resize(self.predicted.len(), Vector3::zeros());
-            let points = inputs.step.points;
-            self.stored = points.elastic_forces(inputs.material, &self.predicted, &mut self.exact);
-        }
-        if self.damps(inputs) {
-            // Prescribed copies count with the velocity that they have in the step.
-            let scratch = self.scratch.iter_mut().zip(&self.predicted);
-            match inputs.inertia {
-                Inertia::Remembered(history) => scratch.zip(history.x_v).for_each(|((v, to), x)| {
-                    *v = padded(&(history.increment.B * (to - x)));
-                }),
-                _ => scratch.zip(&state.x).for_each(|((v, to), x)| *v = padded(&((to - x) / h))),
-            }
-            apply_damping(elastic, team, &self.scratch, &mut self.damping); // s K̂ v
-            // Linearised at x_n, the predictor is h v away: f_int(x̂) ≈ f_int(x_n) + h K̂ v.
-            let beta = if self.ablation.predictor { beta + h } else { beta };
-            let factor = (beta / scale) as f32;
-            self.damping.iter_mut().flatten().for_each(|v| *v *= factor); // β K̂ v
-        }
-        inverted
-    }
-
-    /// Whether the forces of the update contain those of damping: in implicit Euler of a law that rotates.
-    fn damps_by_strain(&self, inputs: &LinearInputs<'_>) -> bool {
-        matches!(inputs.inertia, Inertia::Euler)
-            && inputs.material.law.rotates()
-            && !self.ablation.predictor
-            && !self.ablation.twists
-    }
-
-    /// Whether the step has a damping term K̂ v.
-    fn damps(&self, inputs: &LinearInputs<'_>) -> bool {
-        let by_product = inputs.material.rayleigh.stiffness_s > 0.0 && !self.damps_by_strain(inputs);
-        inputs.moves() && (self.ablation.predictor || by_product)
-    }
-
-    /// Sums internal forces and, if it changed, the diagonal of A and its inverse, without springs.
-    fn sum_chunks(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
-        let factor = inputs.mass_factor();
-        let made_for = Some((elastic.version(), factor));
-        let held = |f: &FixedCopy| (f.copy, f.held);
-        let f_int = blocks(&mut self.f_int, BLOCK);
-        if self.made_for == made_for
-            && inputs.step.fixed.iter().map(held).eq(self.made_for_fixed.iter().copied())
-        {
-            team.for_blocks(f_int, |block, f| elastic.forces(block, f));
-            return;
-        }
-        self.made_for = made_for;
-        if !inputs.step.fixed.iter().map(held).eq(self.made_for_fixed.iter().copied()) {
-            self.made_for_fixed.clear();
-            self.made_for_fixed.extend(inputs.step.fixed.iter().map(held));
-            self.stiff.iter_mut().for_each(|stiff| stiff.stale = true);
-        }
-        self.sprung.clear();
-        let inverses = blocks(self.preconditioner.inverses_mut(), BLOCK);
-        let state = (f_int, blocks(&mut self.diagonal, BLOCK), inverses);
-        let (mass, factor) = (inputs.mass_f32, factor as f32);
-        team.for_blocks(state, |block, (f, diagonal, inverses)| {
-            elastic.forces(block, f);
-            elastic.diagonals(block, diagonal);
-            for ((diagonal, inverse), &mass) in diagonal.iter_mut().zip(inverses).zip(block_of(mass, block)) {
-                for k in [0, 4, 6] {
-                    diagonal[k] += factor * mass;
-                }
-                *inverse = invert(diagonal, [false; 3]);
-            }
-        });
-        self.substitute(team, elastic, inputs);
-        for copy in inputs.step.fixed {
-            let c = copy.copy as usize;
-            self.preconditioner.set(c, &self.diagonal[c], copy.held);
-        }
-    }
-
-    /// Replaces blocks of the preconditioner by those in variables in which degenerate elements are not
-    /// stiff.
-    fn substitute(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
-        let Some(stiff) = &mut self.stiff else { return };
-        if stiff.stale {
-            let held = |copy: u32| inputs.step.fixed.binary_search_by_key(&copy, |f| f.copy).is_ok();
-            let (T, left) = stiff.modes.substitution(held);
-            stiff.composite = CompositeDiagonal::new(&stiff.modes, &T, elastic);
-            (stiff.left, stiff.stale) = (left, false);
-            self.preconditioner.set_substitution(T);
-            self.coarse = None;
-        }
-        let with = inputs.elastic_update();
-        let mass = (inputs.mass_f32, inputs.mass_factor());
-        stiff.composite.update(team, (elastic, &with), mass, &mut self.diagonal);
-        for copy in stiff.composite.copies() {
-            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], Held::NOT);
-        }
-    }
-
-    /// Brings the levels of multigrid up to date with the operator.
-    fn complete_grid(
-        &mut self,
-        team: &mut Team,
-        elastic: &mut dyn Stiffness,
-        inputs: &LinearInputs<'_>,
-        pass: usize,
-    ) {
-        if let Some(grid) = &mut self.grid {
-            if pass == 0 {
-                grid.follow(team, elastic, inputs);
-            }
-            let (diagonal, inverse) = (&self.diagonal, self.preconditioner.inverses());
-            if grid.sort(&self.terms, diagonal) {
-                let bare = |copy: u32| invert_free(&diagonal[copy as usize], inputs.held_of(copy));
-                let mut A = system(elastic, &[], inputs);
-                grid.complete_stiff(team, &mut A, (inverse, &bare), &self.terms);
-            } else {
-                let mut A = system(elastic, &self.terms, inputs);
-                grid.complete(team, &mut A, inverse, &self.terms);
-            }
-        }
-        if let Some(level) = &mut self.simulated {
-            if pass == 0 {
-                level.follow(team, elastic, inputs);
-            }
-            level.set_springs(team, &self.terms);
-        }
-    }
-
     /// Solves the translation equations of every free part for the imbalance that δ leaves.
     fn balance_parts(&mut self, state: &State, inputs: &LinearInputs<'_>, first: bool) {
         if inputs.step.parts.any_free() {
@@ -768,79 +618,6 @@ impl LinearStep {
             descent.memory.end(delta);
         }
         report
-    }
-
-    /// Moves the predictor back by `part` of its last move, of which the rest is left.
-    fn take_back(&mut self, part: f64) {
-        for (x, last) in self.predicted.iter_mut().zip(&mut self.last) {
-            let moved = unpadded(last);
-            *x -= part * moved;
-            *last = padded(&((1.0 - part) * moved));
-        }
-    }
-
-    /// Moves the predictor to x⁺ = x̂ + δ. Returns whether all of it is finite.
-    fn move_predictor(&mut self, team: &mut Team, inputs: &LinearInputs<'_>) -> bool {
-        team.begin(Phase::Commit);
-        let bound = 1e15; // m: far outside any scene, far inside the range of single precision
-        let (delta, shift, of_part) = (&self.delta, &self.translations.shift, &inputs.step.parts.of_copy);
-        let moved = (blocks(&mut self.predicted, BLOCK), blocks(&mut self.last, BLOCK));
-        team.for_blocks((moved, blocks(&mut self.partial, 1)), |block, ((next, last), partial)| {
-            let known = block_of(delta, block).iter().zip(block_of(of_part, block));
-            let mut finite = true;
-            for ((next, last), (delta, &part)) in next.iter_mut().zip(last).zip(known) {
-                let moved = shift[part as usize] + unpadded(delta);
-                *last = padded(&moved);
-                *next += moved;
-                finite &= next.iter().all(|c| c.abs() < bound);
-            }
-            partial[0] = f64::from(u8::from(finite));
-        });
-        // δ is rounded to single precision, and an inclined direction mixes its components.
-        for fixed in inputs.step.fixed.iter().filter(|fixed| fixed.held.is_inclined()) {
-            fixed.held.place(&mut self.predicted[fixed.copy as usize], &fixed.position_m);
-        }
-        !self.partial.contains(&0.0)
-    }
-
-    /// Writes x⁺ and v⁺ to `state`, and the spring forces. Returns the work [J] that the internal forces did if x⁺ solves
-    /// the equations of the step: Σ (M a⁺ − f_ext − f_springs)·(x⁺ − x).
-    fn commit(
-        &mut self,
-        team: &mut Team,
-        state: &mut State,
-        inputs: &LinearInputs<'_>,
-        spring_forces: &mut [Vector3<f64>],
-    ) -> f64 {
-        self.springs.write(spring_forces, |s| s.law().force(s.point(&self.predicted)));
-        let pushed: f64 = self.springs.springs.iter().map(|s| self.work_of(s, state)).sum();
-        let (predicted, rate) = (&self.predicted, inputs.rate());
-        let alpha = inputs.material.rayleigh.mass_1_s;
-        let results =
-            (blocks(&mut state.x, BLOCK), blocks(&mut state.v, BLOCK), blocks(&mut self.partial, 1));
-        team.for_blocks(results, |block, (x, v, work)| {
-            let first = block * BLOCK;
-            let mut sum = 0.0;
-            for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
-                let (c, next) = (first + i, predicted[first + i]);
-                let moved = next - *x;
-                let (faster, a) = match &inputs.inertia {
-                    Inertia::Remembered(h) => ((next - h.x_v[c]) * rate, (next - h.x_a[c]) * h.increment.A),
-                    Inertia::Euler | Inertia::None { .. } => (moved * rate, (moved * rate - *v) * rate),
-                };
-                let inertia = inputs.step.mass[c] * (a + alpha * faster - inputs.step.gravity);
-                sum += (inertia - inputs.step.load[c]).dot(&moved);
-                (*x, *v) = (next, faster);
-            }
-            work[0] = sum;
-        });
-        self.partial.iter().sum::<f64>() - pushed
-    }
-
-    /// Work [J] of a spring in the step.
-    fn work_of(&self, spring: &ActiveSpring, state: &State) -> f64 {
-        let to = spring.point(&self.predicted);
-        spring.law().force(to).dot(&(to - spring.point(&state.x)))
     }
 }
 
