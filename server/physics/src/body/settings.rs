@@ -319,8 +319,15 @@ impl BodySettings {
     /// Settings of steps with a discrete model.
     pub(super) fn dynamics(&self, law: Law) -> DynamicsSettings {
         let SolverSettings { newton, relaxation, .. } = self.step_solver(law);
-        let (scheme, mass, linearised) = (self.scheme, self.mass, self.is_linearised(law));
-        DynamicsSettings { scheme, mass, linearised, newton, relaxation, ..DynamicsSettings::default() }
+        DynamicsSettings {
+            scheme: self.scheme,
+            mass: self.mass,
+            linearised: self.is_linearised(law),
+            newton,
+            relaxation,
+            ablation: self.ablation,
+            ..DynamicsSettings::default()
+        }
     }
 
     /// Checks that every setting is in its range and compatible with the others and with `law`.

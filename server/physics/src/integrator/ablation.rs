@@ -13,7 +13,8 @@ pub struct Ablation {
     pub predictor: bool,
     /// The fast path bounds friction by the normal force of the last step instead of that at the end of this one.
     pub lagged_friction: bool,
-    /// The fast path's stiffness under tension is that of relaxed material.
+    /// One linear solve per step takes the stiffness of relaxed material under tension, too, and velocities for rates of
+    /// strain.
     pub twists: bool,
     /// Newton's method takes every full step, even if the potential rises.
     pub line_search: bool,

@@ -47,7 +47,7 @@ macro_rules! step_potential {
             alpha,
             damping: $solver.damping.as_ref().filter(|_| increment.B > 0.0).map(|K| (beta, K)),
             turned: &$solver.turned,
-            tension: (increment.A > 0.0).then_some(&$before.x[..]),
+            tension: (increment.A > 0.0 && !$solver.settings.ablation.twists).then_some(&$before.x[..]),
             f_ext: &$solver.f_ext,
             springs: &$solver.active.springs,
             pressure: ($inputs.pressure, &mut $solver.follower),
@@ -91,7 +91,7 @@ impl ModelSolver {
             self.model.rotated_stiffness(&state.x, K);
             self.turned.fill(Vector3::zeros());
             // In other schemes the expansions of a steady turn cancel.
-            if scheme == Scheme::ImplicitEuler {
+            if scheme == Scheme::ImplicitEuler && !self.settings.ablation.twists {
                 self.model.add_turned_strain(&state.x, &before.x, &mut self.turned);
             }
         }

@@ -2,6 +2,7 @@
 
 use scindo_algebra::solver::{LinearSettings, Method, NewtonSettings, Precision};
 
+use super::ablation::Ablation;
 use super::scheme::{MassKind, Scheme};
 
 /// Settings of a [`ModelSolver`](super::ModelSolver).
@@ -24,6 +25,8 @@ pub struct DynamicsSettings {
     /// Explicit schemes: largest number of parts into which a step longer than the stable one is divided;
     /// 1 refuses such a step.
     pub most_substeps: u32,
+    /// What a mutation test leaves out.
+    pub ablation: Ablation,
 }
 
 /// Least number of Newton steps where one linear solve cannot be trusted.
@@ -44,6 +47,7 @@ impl Default for DynamicsSettings {
             newton: NewtonSettings { steps: 20, tolerance: 1e-6, linear, ..NewtonSettings::default() },
             relaxation: None,
             most_substeps: 256,
+            ablation: Ablation::default(),
         }
     }
 }
