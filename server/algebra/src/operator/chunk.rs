@@ -11,7 +11,7 @@ use super::chunks::{NO_PIECE, pack, plan_chunk};
 use super::edges::EdgeBlocks;
 use super::kernel::Batches;
 use super::shared_lanes::Merged;
-use super::stiffness::UpdateAt;
+use super::stiffness::{Tension, UpdateAt};
 use super::strips::{AS_IN_MESH, Corners, corners_of};
 use super::tet_batch::{Block6, Coefficients, EnergyCoefficients, Locals, RestBatch};
 use super::tet_lanes::Found;
@@ -295,8 +295,27 @@ impl Chunk {
         self.stale = false;
         if let (true, Some(twists), Some(tension)) = (pulled, &c.twists, tension) {
             self.gather(tension.at);
-            self.batches.find_twists(simd, twists, &self.positions, diagonal);
+            self.batches.find_twists(simd, twists, &self.positions, diagonal, false);
         }
+    }
+
+    /// Whether twists count since the last update.
+    pub(super) fn is_twisted(&self) -> bool {
+        self.batches.is_twisted()
+    }
+
+    /// Lets twists count that do not matter here, but elsewhere in the body.
+    pub(super) fn twist(
+        &mut self,
+        simd: Simd,
+        c: &Coefficients,
+        tension: &Tension<'_>,
+        diagonal: &mut [Block6],
+    ) {
+        let Some(twists) = &c.twists else { return };
+        self.gather(tension.at);
+        let diagonal = self.used(diagonal);
+        self.batches.find_twists(simd, twists, &self.positions, diagonal, true);
     }
 
     /// Computes the energy with the rotations of the last update.

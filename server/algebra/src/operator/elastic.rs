@@ -297,6 +297,17 @@ impl Stiffness for Elastic {
                 }
             });
         }
+        // All chunks take part where one does: a border between those that do and others would cost iterations.
+        if let (Some(tension), true) = (tension, self.chunks.iter().any(Chunk::is_twisted)) {
+            let diagonals = ranges(&mut self.diagonals, &self.gather.first_row);
+            team.for_blocks((blocks(&mut self.chunks, 1), diagonals), |_, (chunk, diagonal)| {
+                if !chunk[0].is_twisted() {
+                    let c = groups.coefficients(chunk[0].group, with, Some(tension));
+                    chunk[0].twist(simd, &c, tension, diagonal);
+                    chunk[0].assemble(assembled);
+                }
+            });
+        }
         if !c.rotates {
             let sums = ranges(&mut self.sums, &self.gather.first_row);
             team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {

@@ -186,21 +186,22 @@ impl Batches {
     }
 
     /// Computes the twists at the positions `x` [m], perhaps others than those of the last update. If they matter
-    /// anywhere, all of them count from now on, and their diagonal blocks are added to `to`.
+    /// anywhere, or if `they_do` elsewhere, all of them count from now on, and their diagonal blocks are added to `to`.
     pub(super) fn find_twists(
         &mut self,
         simd: Simd,
         c: &TwistCoefficients,
         x: &[[f64; 4]],
         to: &mut [Block6],
+        they_do: bool,
     ) {
         assert!(x.len() == self.n_locals && to.len() == self.n_locals);
         self.twists.resize(self.live.len(), TwistBatch::default());
         self.twisted = match simd {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: both come from `Simd::detect` only.
-            Simd::Avx2 | Simd::Avx512 => unsafe { avx2::find_twists(self, c, x, to) },
-            _ => find_twists_with::<Lanes>(self, c, x, to),
+            Simd::Avx2 | Simd::Avx512 => unsafe { avx2::find_twists(self, c, x, to, they_do) },
+            _ => find_twists_with::<Lanes>(self, c, x, to, they_do),
         };
     }
 
@@ -290,25 +291,28 @@ fn note_start_with<V: Vector8>(of: &mut Batches, x: &[[f64; 4]]) {
     }
 }
 
-/// Twists of all tets at the positions `x`. If they matter anywhere, their blocks are added to `to`; returns whether.
+/// Twists of all tets at the positions `x`. If they matter anywhere, or if `they_do` elsewhere, their blocks are added to
+/// `to`; returns whether.
 #[inline(always)]
 fn find_twists_with<V: Vector8>(
     of: &mut Batches,
     c: &TwistCoefficients,
     x: &[[f64; 4]],
     to: &mut [Block6],
+    they_do: bool,
 ) -> bool {
     let live = of.live.as_chunks::<1>().0;
     let mut matter = 0;
     for ((live, rest), twist) in live.iter().zip(of.rest.as_chunks().0).zip(of.twists.as_chunks_mut().0) {
         matter |= update_twist::<V, 1>(c, &tet_edges(x, live), rest, twist);
     }
-    if matter != 0 {
+    let count = they_do || matter != 0;
+    if count {
         for (live, twist) in live.iter().zip(of.twists.as_chunks().0) {
             scatter_corner_blocks::<V, 1>(to, live, &twist_blocks(live, twist));
         }
     }
-    matter != 0
+    count
 }
 
 #[inline(always)]
@@ -460,8 +464,9 @@ mod avx2 {
         c: &TwistCoefficients,
         x: &[[f64; 4]],
         to: &mut [Block6],
+        they_do: bool,
     ) -> bool {
-        super::find_twists_with::<Register>(of, c, x, to)
+        super::find_twists_with::<Register>(of, c, x, to, they_do)
     }
 
     #[target_feature(enable = "avx2,fma")]

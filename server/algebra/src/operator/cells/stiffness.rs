@@ -250,9 +250,9 @@ impl Stiffness for CellStiffness {
         self.set_twists(with, tension.filter(|_| rotates));
         let CellOperator { simd, tables, chunks, gather, sums, diagonals, .. } = &mut self.operator;
         let (simd, with) = (*simd, CellTables { tables, scale: with.scale as f32 });
-        let rows = (ranges(sums, &gather.first_row), ranges(diagonals, &gather.first_row));
+        let rows = (ranges(sums, &gather.first_row), ranges(&mut *diagonals, &gather.first_row));
         let (rest, lattice) = (&self.rest, &self.lattice);
-        team.for_blocks((blocks(chunks, 1), rows), |k, (chunk, (f, diagonal))| {
+        team.for_blocks((blocks(&mut *chunks, 1), rows), |k, (chunk, (f, diagonal))| {
             let (chunk, rest): (&mut CellChunk, &RestChunk) = (&mut chunk[0], &rest[k]);
             if rotates {
                 rest.update(simd, chunk, with, UpdateAt { positions, tension }, f);
@@ -264,7 +264,17 @@ impl Stiffness for CellStiffness {
                 chunk.diagonals(simd, with.tables, diagonal);
             }
         });
-        self.operator.chunks.iter().map(|chunk| chunk.inverted).sum()
+        // All chunks take part where one does, as in those of tetrahedra.
+        if let (Some(tension), true) = (tension, chunks.iter().any(|chunk| chunk.twisted)) {
+            let rows = ranges(diagonals, &gather.first_row);
+            team.for_blocks((blocks(&mut *chunks, 1), rows), |k, (chunk, diagonal)| {
+                if !chunk[0].twisted {
+                    rest[k].find_twists(simd, &mut chunk[0], with.tables, tension.at, true);
+                    chunk[0].diagonals(simd, with.tables, diagonal);
+                }
+            });
+        }
+        chunks.iter().map(|chunk| chunk.inverted).sum()
     }
 
     #[inline(always)]

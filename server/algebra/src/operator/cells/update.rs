@@ -101,12 +101,20 @@ impl RestChunk {
             pulled |= part.pulled;
         }
         if let (true, Some(tension)) = (pulled != 0, tension) {
-            self.find_twists(simd, chunk, with.tables, tension.at);
+            self.find_twists(simd, chunk, with.tables, tension.at, false);
         }
     }
 
-    /// Finds the twists of `chunk` at other `positions` than those of the update, and whether they matter.
-    fn find_twists(&self, simd: Simd, chunk: &mut CellChunk, tables: &[Table], positions: &[Vector3<f64>]) {
+    /// Finds the twists of `chunk` at other `positions` than those of the update. They count if they matter here, or if
+    /// `they_do` elsewhere in the body.
+    pub(super) fn find_twists(
+        &self,
+        simd: Simd,
+        chunk: &mut CellChunk,
+        tables: &[Table],
+        positions: &[Vector3<f64>],
+        they_do: bool,
+    ) {
         let local = local_positions(chunk, positions);
         chunk.twists.resize(chunk.batches.len(), TwistBatch::default());
         let mut matter = 0;
@@ -128,7 +136,7 @@ impl RestChunk {
                 _ => unsafe { find_twists_with::<Lanes>(batches, sides, weights, &local, c, twists) },
             };
         }
-        chunk.twisted = matter != 0;
+        chunk.twisted = they_do || matter != 0;
     }
 
     /// f = K u with displacements u relative to the chunk's first vertex, subtracted in double precision: the
