@@ -380,8 +380,8 @@ impl Dynamics {
             [solver.elastic_energy(team, state, inputs.points), solver.kinetic_energy(inputs.mass, &state.v)]
         };
         let careful = balance.is_careful();
-        if let Some(excess_j) = balance.book(report.internal_work_j, energies) {
-            report.notice = Some(Notice::Unbalanced { excess_j, careful });
+        if let Some((excess_j, again)) = balance.book(report.internal_work_j, energies) {
+            report.notice = Some(Notice::Unbalanced { excess_j, careful, again });
         }
     }
 

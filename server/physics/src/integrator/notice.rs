@@ -65,6 +65,8 @@ pub enum Notice {
         excess_j: f64,
         /// Whether the steps had taken several solves already.
         careful: bool,
+        /// Whether it had happened not long before.
+        again: bool,
     },
     /// Elements were inverted or collapsed, so more Newton steps were allowed than requested.
     Recovery,
@@ -126,7 +128,7 @@ impl fmt::Display for Notice {
             Self::SpinDivided { substeps } => {
                 write!(f, "loose parts turned far and gained energy: divided into {substeps} sub-steps")
             }
-            Self::Unbalanced { excess_j, careful } => write!(
+            Self::Unbalanced { excess_j, careful, .. } => write!(
                 f,
                 "{excess_j:.1e} J came from nowhere in the last steps: {}",
                 match careful {

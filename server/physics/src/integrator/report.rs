@@ -52,9 +52,9 @@ impl SolveReport {
         self.outcome == Outcome::Advanced && self.tolerance > 0.0 && self.residual > self.tolerance
     }
 
-    /// Whether energy came from nowhere in this step and those just before it: the body may shake for ever.
+    /// Whether energy came from nowhere again in this step and those just before it: the body may shake for ever.
     pub fn is_unbalanced(&self) -> bool {
-        matches!(self.notice, Some(Notice::Unbalanced { .. }))
+        matches!(self.notice, Some(Notice::Unbalanced { again: true, .. }))
     }
 
     /// Whether the step failed as a whole and was made in parts. Sub-steps that an explicit integrator

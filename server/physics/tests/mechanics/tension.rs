@@ -1,7 +1,7 @@
 //! Stretched bodies come to rest where they balance, whatever the step.
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Ablation, Arithmetic, Body, BodySettings, Outcome, PcgSettings, Scheme};
+use scindo_physics::body::{Ablation, Arithmetic, Body, BodySettings, Notice, Outcome, PcgSettings, Scheme};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
@@ -68,7 +68,7 @@ fn stretched(mut body: Body, stretch: f64, h: f64) -> End {
         let report = body.step(h, DOWN, &[]);
         assert_eq!(report.outcome, Outcome::Advanced, "step {k}: {report:?}");
         inverted += usize::from(report.inverted_pieces > 0);
-        unbalanced += usize::from(report.is_unbalanced());
+        unbalanced += usize::from(matches!(report.notice, Some(Notice::Unbalanced { .. })));
         if time > seconds - 1.0 {
             iterations += report.iterations;
             let sag = |&n: &u32| body.rest_positions()[n as usize].z - body.positions()[n as usize].z;
@@ -151,21 +151,17 @@ fn newmarks_method_settles_near_it() {
     }
 }
 
-/// Without the twists the strip shakes, and says so, unless the several solves that are made then bring it to rest where
-/// it belongs.
+/// Without the twists, the strip shakes, and says so.
 #[test]
 fn what_does_not_balance_is_noticed() {
     for (young_pa, damping, stretch) in [(1e4, 0.02, 0.1), (1e4, 0.0, 0.5), (1e4, 0.0, 0.0), (1e5, 0.02, 0.1)]
     {
         for name in [Scheme::ImplicitEuler, Scheme::Bdf2] {
             let ablation = Ablation { twists: true, ..Ablation::default() };
-            let material = tissue(young_pa, damping);
+            let settings = BodySettings { ablation, ..scheme(name) };
             for make in [strip, strip_of_cells] {
-                let run = |settings| stretched(make(material, settings), stretch, 0.02);
-                let end = run(BodySettings { ablation, ..scheme(name) });
-                let rests =
-                    || (end.sag_mm / run(scheme(name)).sag_mm - 1.0).abs() < 0.01 && end.range_mm < 1e-3;
-                assert!(end.unbalanced > 0 || rests(), "{name:?} {young_pa} {damping} {stretch}: {end:?}");
+                let end = stretched(make(tissue(young_pa, damping), settings), stretch, 0.02);
+                assert!(end.unbalanced > 0, "{name:?} {young_pa} {damping} {stretch}: {end:?}");
             }
         }
     }
