@@ -377,7 +377,8 @@ impl Dynamics {
             return balance.forget();
         }
         let energies = || {
-            [solver.elastic_energy(team, state, inputs.points), solver.kinetic_energy(inputs.mass, &state.v)]
+            let elastic_j = solver.elastic_energy(team, state, inputs.points);
+            [elastic_j, solver.kinetic_energy(inputs.mass, &state.v), solver.rounding_energy(inputs.mass)]
         };
         let careful = balance.is_careful();
         if let Some((excess_j, again)) = balance.book(report.internal_work_j, energies) {

@@ -58,8 +58,8 @@ use super::step_inputs::{Inertia, KnownLoads, LinearInputs, Predictor, StepOutco
 const FORCING: f64 = 0.1;
 /// The equations of a step in motion hold once their residual is this many times the tolerance of its linear solves.
 const EQUATIONS: f64 = 10.0;
-/// They hold with this residual in any case: forces in single precision tell no more of it.
-const LEAST_RESIDUAL: f64 = 1e-5;
+/// A residual below this that a solve has not halved is rounding: forces in single precision tell no more of it.
+const ROUNDED: f64 = 1e-3;
 /// Largest number of passes of a linear solve, repeated while springs open, close, slip or reach their cap.
 const SPRING_PASSES: usize = 8;
 /// The residual is measured against the right-hand side, but at least against this fraction of the loads.
@@ -632,7 +632,8 @@ fn without_solve(
     if !inputs.moves() {
         return None;
     }
-    if !first && began <= (EQUATIONS * inputs.solver.tolerance).max(LEAST_RESIDUAL) {
+    let rounding = *least < ROUNDED && began > 0.5 * *least;
+    if !first && (rounding || began <= EQUATIONS * inputs.solver.tolerance) {
         return Some(LinearReport::default());
     }
     if began > *least {

@@ -44,6 +44,9 @@ const MOST_SPIN_HALVINGS: u32 = 4;
 /// Relative gain of energy that counts as rounding.
 const GAIN: f64 = 1e-6;
 
+/// Strain of a whole body that forces in single precision do not tell from none.
+const ROUNDED_STRAIN: f64 = 1e-5;
+
 /// Stiffness and buffers of steps by linear solves.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct LinearlyImplicit {
@@ -267,6 +270,11 @@ impl StepSolver for LinearlyImplicit {
         let (material, x) = (&self.material, &state.x);
         let with = ElasticUpdate { lame: material.lame(), law: material.law, scale: 1.0 };
         self.stiffness.energy(team, &with, x).unwrap_or_else(|| points.energy(material, x))
+    }
+
+    fn rounding_energy(&self, mass: &[f64]) -> f64 {
+        let Material { young_pa, density_kg_m3, .. } = self.material;
+        young_pa * ROUNDED_STRAIN.powi(2) * mass.iter().sum::<f64>() / density_kg_m3
     }
 
     fn set_material(&mut self, material: Material) {

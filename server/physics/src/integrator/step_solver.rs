@@ -65,6 +65,12 @@ pub trait StepSolver: Any + Debug + Send {
     /// Elastic energy [J] in `state` of the body with these quadrature points.
     fn elastic_energy(&mut self, team: &mut Team, state: &State, points: &dyn Points) -> f64;
 
+    /// Elastic energy [J] that is not told from rounding, of a body with these lumped masses [kg].
+    fn rounding_energy(&self, mass: &[f64]) -> f64 {
+        let _ = mass;
+        0.0
+    }
+
     /// Follows `state`, whose strains of springs were changed from outside.
     fn follow_viscous(&mut self, team: &mut Team, state: &State) {
         let _ = (team, state);
