@@ -37,6 +37,8 @@ pub(super) struct Chunk {
     rest: Vec<Vector3<f64>>,
     /// The assembled stiffness, if it is in use.
     edges: Option<EdgeBlocks>,
+    /// Whether it is the tangent of a law that is nonlinear in the stretch.
+    own_tangent: bool,
     /// Lanes (batch, lane) that have changed since it was assembled.
     unassembled: Vec<[usize; 2]>,
     /// Pieces with det F ≤ 0 at the last update.
@@ -85,6 +87,7 @@ impl Chunk {
             pieces: plan.pieces,
             rest: rest_positions(&plan.copies, &pieces, mesh, merged),
             edges: None,
+            own_tangent: false,
             unassembled: Vec::new(),
             planned: [members.len(), plan.copies.len()],
             n_lanes: members.len(),
@@ -198,8 +201,12 @@ impl Chunk {
         self.n_lanes
     }
 
-    /// Assembles the stiffness of the last update, or drops the assembled one if it is not `wanted`.
+    /// Assembles the stiffness of the last update, or drops the assembled one if it is not `wanted`. A law with a tangent
+    /// of its own has assembled it already.
     pub(super) fn assemble(&mut self, wanted: bool) {
+        if self.own_tangent {
+            return;
+        }
         let Self { edges, batches, unassembled, .. } = self;
         match edges {
             _ if !wanted => *edges = None,
@@ -232,9 +239,11 @@ impl Chunk {
     pub(super) fn apply(&self, simd: Simd, with_twists: bool, y: &mut [Padded]) {
         let y = self.used(y);
         y.fill([0.0; 4]);
-        // The assembled stiffness contains the twists.
+        // The assembled stiffness contains the twists, or it is the tangent of another law.
         match &self.edges {
-            Some(edges) if with_twists || !self.batches.is_twisted() => edges.apply(simd, &self.x, y),
+            Some(edges) if with_twists || !(self.own_tangent || self.batches.is_twisted()) => {
+                edges.apply(simd, &self.x, y)
+            }
             _ => self.batches.apply(simd, with_twists, &self.x, y),
         }
     }
@@ -290,9 +299,18 @@ impl Chunk {
         f.fill([0.0; 4]);
         diagonal.fill([0.0; 8]);
         let mut locals = Locals { x: &self.positions, f, blocks: diagonal };
-        let Found { inverted, pulled } = self.batches.update(simd, c, &mut locals);
-        self.inverted = inverted;
         self.stale = false;
+        if let Some(law) = &c.law {
+            let edges = self.edges.get_or_insert_with(|| EdgeBlocks::new(&self.batches));
+            if !self.unassembled.is_empty() {
+                edges.follow(&self.batches, self.unassembled.drain(..));
+            }
+            self.inverted = edges.update(&mut self.batches, simd, (c, law), &mut locals);
+            self.own_tangent = true;
+            return;
+        }
+        let Found { inverted, pulled } = self.batches.update(simd, c, &mut locals);
+        (self.inverted, self.own_tangent) = (inverted, false);
         if let (true, Some(twists), Some(tension)) = (pulled, &c.twists, tension) {
             self.gather(tension.at);
             self.batches.find_twists(simd, twists, &self.positions, diagonal, false);

@@ -13,9 +13,11 @@ use scindo_matter::element::{Ids, LANES, Lanes, Simd, Vector8};
 use super::Padded;
 use super::chunks::{NO_PIECE, pack};
 use super::kernel::Batches;
+use super::law_coefficients::LawCoefficients;
+use super::tet_batch::{Block6, Coefficients, Locals, PAIRS};
 
-/// Pairs of corners of a tet.
-const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+/// Rows and columns of the entries of a diagonal block.
+const UPPER: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
 /// Eight pairs of copies.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
@@ -106,9 +108,7 @@ impl EdgeBlocks {
     /// Sums the blocks of the tets as they are in `tets`: with the gradients g′ of the kernel,
     /// K_ab = ½ (g′_a·g′_b I + g′_b g′_aᵀ) + λ/2μ g′_a g′_bᵀ, and −½ [g′_a]× Q [g′_b]× with twists.
     pub(super) fn assemble(&mut self, tets: &Batches) {
-        for batch in &mut self.batches {
-            batch.block = [[Lanes::default(); 3]; 3];
-        }
+        self.clear();
         for (t, slots) in self.slots.iter().enumerate() {
             for lane in 0..LANES {
                 let (g, ids) = tets.gradients(t, lane);
@@ -133,6 +133,66 @@ impl EdgeBlocks {
                     let twist = cross_a * Q * cross_b * -0.5;
                     for (r, s) in (0..9).map(|k| (k / 3, k % 3)) {
                         block[r][s].0[slot % LANES] += twist[(r, s)];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Updates `tets` of a law that is nonlinear in the stretch, whose tangent is summed here. Returns the number of pieces
+    /// with det F ≤ 0.
+    pub(super) fn update(
+        &mut self,
+        tets: &mut Batches,
+        simd: Simd,
+        c: (&Coefficients, &LawCoefficients),
+        locals: &mut Locals<'_>,
+    ) -> usize {
+        self.clear();
+        let mut inverted = 0;
+        tets.begin_law(c.0, locals);
+        for t in 0..tets.n_batches() {
+            let tet = tets.update_law(simd, c, t, locals);
+            inverted += tet.inverted;
+            self.add(tets, t, &tet.blocks);
+        }
+        self.add_diagonals(locals.blocks);
+        inverted
+    }
+
+    /// Sets all blocks to 0.
+    fn clear(&mut self) {
+        for batch in &mut self.batches {
+            batch.block = [[Lanes::default(); 3]; 3];
+        }
+    }
+
+    /// Adds the blocks K_ij, row by row, of every pair of corners i < j of batch number `t` of `tets`.
+    fn add(&mut self, tets: &Batches, t: usize, blocks: &[[Lanes; 9]; 6]) {
+        for ((slots, [i, j]), from) in self.slots[t].iter().zip(PAIRS).zip(blocks) {
+            for lane in (0..LANES).filter(|&lane| slots[lane] != NO_PIECE) {
+                let (ids, slot) = (tets.ids(t, lane), slots[lane] as usize);
+                let block = &mut self.batches[slot / LANES].block;
+                for r in 0..3 {
+                    for s in 0..3 {
+                        // K_ji is the transpose of K_ij.
+                        let entry = if ids[i] < ids[j] { 3 * r + s } else { 3 * s + r };
+                        block[r][s].0[slot % LANES] += from[entry].0[lane];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds the diagonal blocks: minus the sum of the others of their rows.
+    fn add_diagonals(&self, to: &mut [Block6]) {
+        for batch in &self.batches {
+            for lane in 0..LANES {
+                for (end, ids) in batch.nodes.iter().enumerate() {
+                    let diagonal = &mut to[ids[lane] as usize];
+                    for (place, (r, s)) in [0, 1, 2, 4, 5, 6].into_iter().zip(UPPER) {
+                        let (r, s) = if end == 0 { (r, s) } else { (s, r) };
+                        diagonal[place] -= batch.block[r][s].0[lane];
                     }
                 }
             }

@@ -318,6 +318,9 @@ impl Stiffness for Elastic {
     }
 
     fn energy(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> Option<f64> {
+        if !with.law.is_hookean() {
+            return None;
+        }
         let (simd, groups) = (self.simd, &self.groups);
         team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
             let Coefficients { mu, lambda, rotates, .. } = groups.coefficients(chunk[0].group, with, None);

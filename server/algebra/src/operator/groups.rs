@@ -3,8 +3,9 @@
 //! Every chunk of the stiffness holds pieces of one group, so its kernels work with one pair of Lamé constants.
 
 use nalgebra::Vector3;
-use scindo_matter::material::{Lame, Region, Regions};
+use scindo_matter::material::{Lame, Law, Region, Regions};
 
+use super::law_coefficients::LawCoefficients;
 use super::stiffness::{ElasticUpdate, Tension};
 use super::tet_batch::Coefficients;
 use super::twist::TwistCoefficients;
@@ -68,15 +69,18 @@ impl Groups {
             TwistCoefficients::new(lame, density, tension.s, with.scale)
         });
         let damping = tension.map_or(0.0, |tension| tension.damping as f32);
-        Coefficients { twists, damping, ..Coefficients::of(with, lame) }
+        let s = tension.map_or(with.scale, |tension| tension.s);
+        let definite = tension.is_none_or(|tension| tension.definite);
+        let law = LawCoefficients::new(with.law, lame, s, with.scale - s, definite);
+        Coefficients { law, twists, damping, ..Coefficients::of(with, lame) }
     }
 }
 
 impl Coefficients {
     /// Those of an update for a material of these Lamé constants.
     pub(super) fn of(with: &ElasticUpdate, Lame { mu, lambda }: Lame) -> Self {
-        let (scale, rotates) = (with.scale as f32, with.law.rotates());
-        Self { mu: mu as f32, lambda: lambda as f32, scale, rotates, twists: None, damping: 0.0 }
+        let (mu, lambda, scale) = (mu as f32, lambda as f32, with.scale as f32);
+        Self { mu, lambda, scale, rotates: with.law != Law::Linear, law: None, twists: None, damping: 0.0 }
     }
 }
 

@@ -42,11 +42,12 @@ pub fn invert(block: &Block6, fixed: [bool; 3]) -> Inverse3 {
     }
     let s = 1.0 / trace;
     let [xx, xy, xz, yy, yz, zz] = hold([xx, xy, xz, yy, yz, zz].map(|v| v * s), fixed, 1.0);
-    // Cofactors; a block that lost its definiteness to rounding falls back to its trace.
+    // Cofactors; a block that is not definite, if only by rounding, falls back to its trace.
     let (cxx, cxy, cxz) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
     let (cyy, cyz, czz) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
     let det = xx * cxx + xy * cxy + xz * cxz;
-    let inverse = if det > 1e-12 {
+    let definite = xx > 0.0 && czz > 0.0 && det > 1e-12;
+    let inverse = if definite {
         let t = s / det;
         [cxx, cxy, cxz, cyy, cyz, czz].map(|c| (c * t) as f32)
     } else {

@@ -5,6 +5,8 @@
 
 use scindo_matter::element::{Batched, Ids, LANES, Lanes, Simd, Vector8, prefetch, prefetch_at};
 
+use super::hyperelastic::{self, LawTet};
+use super::law_coefficients::LawCoefficients;
 use super::tet_batch::{Batch, Block6, Coefficients, EnergyCoefficients, Locals, RestBatch};
 use super::tet_lanes::{
     Found, Three, UpdatedTet, edges, forces, load, note_start, read, scatter_block, sum_of_outer_products,
@@ -174,6 +176,30 @@ impl Batches {
         }
     }
 
+    /// Begins an update with a law that is nonlinear in the stretch.
+    pub(super) fn begin_law(&mut self, c: &Coefficients, locals: &Locals<'_>) {
+        let n = self.n_locals;
+        assert!(locals.x.len() == n && locals.f.len() == n && locals.blocks.len() == n);
+        (self.twisted, self.ratio) = (false, 0.5 * c.lambda / c.mu);
+    }
+
+    /// Makes it for batch number `t`.
+    pub(super) fn update_law(
+        &mut self,
+        simd: Simd,
+        c: (&Coefficients, &LawCoefficients),
+        t: usize,
+        locals: &mut Locals<'_>,
+    ) -> LawTet {
+        let (live, rest) = (&mut self.live[t], &mut self.rest[t]);
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: both come from `Simd::detect` only.
+            Simd::Avx2 | Simd::Avx512 => unsafe { avx2::update_law(c, locals, rest, live) },
+            _ => update_law_with::<Lanes>(c, locals, rest, live),
+        }
+    }
+
     /// Notes the strains at the positions `x` [m], where a step starts.
     pub(super) fn note_start(&mut self, simd: Simd, x: &[[f64; 4]]) {
         assert!(x.len() == self.n_locals);
@@ -282,6 +308,23 @@ fn scatter_corner_blocks<V: Batched<N>, const N: usize>(
             scatter_block(to, &live[batch].nodes[k], &blocks[k], batch);
         }
     }
+}
+
+/// Updates one batch of tets of a nonlinear law.
+#[inline(always)]
+fn update_law_with<V: Vector8>(
+    c: (&Coefficients, &LawCoefficients),
+    locals: &mut Locals<'_>,
+    rest: &mut RestBatch,
+    live: &mut Batch,
+) -> LawTet {
+    let edges = tet_edges::<V, 1>(locals.x, std::array::from_ref(live));
+    let tet = hyperelastic::update_tet::<V>(c.0, c.1, &edges, rest, live);
+    for (ids, f) in live.nodes.iter().zip(&tet.f) {
+        // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+        unsafe { V::scatter(locals.f, ids, load(f)) };
+    }
+    tet
 }
 
 #[inline(always)]
@@ -438,8 +481,8 @@ mod avx2 {
     //! The same loops compiled for AVX2 and FMA.
 
     use super::{
-        Batch, Batches, Block6, Coefficients, EnergyCoefficients, Found, Locals, Padded, RestBatch,
-        TwistCoefficients,
+        Batch, Batches, Block6, Coefficients, EnergyCoefficients, Found, LawCoefficients, LawTet, Locals,
+        Padded, RestBatch, TwistCoefficients,
     };
     use scindo_matter::element::avx2::Register;
 
@@ -451,6 +494,16 @@ mod avx2 {
     #[target_feature(enable = "avx2,fma")]
     pub(super) fn update(of: &mut Batches, c: &Coefficients, locals: &mut Locals<'_>) -> Found {
         super::update_all::<Register, 1>(of, c, locals)
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub(super) fn update_law(
+        c: (&Coefficients, &LawCoefficients),
+        locals: &mut Locals<'_>,
+        rest: &mut RestBatch,
+        live: &mut Batch,
+    ) -> LawTet {
+        super::update_law_with::<Register>(c, locals, rest, live)
     }
 
     #[target_feature(enable = "avx2,fma")]

@@ -22,6 +22,8 @@ mod system;
 mod tet_batch;
 mod tet_lanes;
 mod twist;
+mod hyperelastic;
+mod law_coefficients;
 
 pub use composite_diagonal::CompositeDiagonal;
 pub use elastic::Elastic;

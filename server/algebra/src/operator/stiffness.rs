@@ -50,6 +50,8 @@ pub struct Tension<'a> {
     /// [`Stiffness::multiply_damping`]. Strains know rotations of any size: spinning material is not damped at all, while
     /// the product of K̂ with velocities takes the arc of a turn for an expansion.
     pub damping: f64,
+    /// Whether the tangent of a law that is nonlinear in the stretch is made positive semidefinite.
+    pub definite: bool,
 }
 
 /// Positions [m] of an update, one per copy, and what counts beside them.

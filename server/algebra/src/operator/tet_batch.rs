@@ -5,9 +5,13 @@ use scindo_matter::element::{Ids, LANES, Lanes, Mat3};
 use scindo_matter::mesh::TetMesh;
 
 use super::Padded;
+use super::law_coefficients::LawCoefficients;
 use super::shared_lanes::Merged;
 use super::strips::Corners;
 use super::twist::TwistCoefficients;
+
+/// Pairs of corners of a tet.
+pub(super) const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// Symmetric 3×3 block (xx, xy, xz, 0, yy, yz, zz, 0): the sum of s K̂ over the pieces around a copy.
 pub type Block6 = [f32; 8];
@@ -100,6 +104,8 @@ pub(super) struct Coefficients {
     pub scale: f32,
     /// Whether pieces rotate (corotational) or keep R = I (linear).
     pub rotates: bool,
+    /// Constants of a law that is nonlinear in the stretch.
+    pub law: Option<LawCoefficients>,
     /// Constants of twists, where these may be needed.
     pub twists: Option<TwistCoefficients>,
     /// β/h, if forces contain those of damping: β times the change of strain since the start of the step, over h.

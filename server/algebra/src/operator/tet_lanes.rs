@@ -41,7 +41,7 @@ pub(super) fn read<V: Batched<N>, const N: usize, B>(
 }
 
 #[inline(always)]
-fn product<V: Vector>(A: &[[V; 3]; 3], v: &[V; 3]) -> [V; 3] {
+pub(super) fn product<V: Vector>(A: &[[V; 3]; 3], v: &[V; 3]) -> [V; 3] {
     [dot(&A[0], v), dot(&A[1], v), dot(&A[2], v)]
 }
 
@@ -312,7 +312,7 @@ fn rotate_guarded(F: &Mat3<Lanes>, R: &Mat3<Lanes>, trusted: u16, rest: &mut Res
 
 /// ε = sym(RᵀF) − I, as (xx, xy, xz, yy, yz, zz).
 #[inline(always)]
-fn biot_strain<V: Vector>(F: &[[V; 3]; 3], R: &[[V; 3]; 3]) -> [V; 6] {
+pub(super) fn biot_strain<V: Vector>(F: &[[V; 3]; 3], R: &[[V; 3]; 3]) -> [V; 6] {
     // RᵀF column by column
     let mut S = *F;
     for i in 0..3 {
@@ -327,7 +327,12 @@ fn biot_strain<V: Vector>(F: &[[V; 3]; 3], R: &[[V; 3]; 3]) -> [V; 6] {
 
 /// w V P = w V R (2μ ε + λ tr(ε) I).
 #[inline(always)]
-fn piola_stress<V: Vector>(strain: &[V; 6], R: &[[V; 3]; 3], two_mu_volume: V, ratio: V) -> [[V; 3]; 3] {
+pub(super) fn piola_stress<V: Vector>(
+    strain: &[V; 6],
+    R: &[[V; 3]; 3],
+    two_mu_volume: V,
+    ratio: V,
+) -> [[V; 3]; 3] {
     let [xx, xy, xz, yy, yz, zz] = *strain;
     let pressure = ratio * (xx + yy + zz);
     let (sxx, syy, szz) =

@@ -77,4 +77,9 @@ impl Law {
     pub fn rotates(self) -> bool {
         matches!(self, Law::Corotational)
     }
+
+    /// Whether the stress is linear in the stretch, so that a linear solve from the predictor makes a step.
+    pub fn is_hookean(self) -> bool {
+        matches!(self, Law::Linear | Law::Corotational)
+    }
 }

@@ -104,7 +104,7 @@ fn updated(simd: Simd, threads: usize, octree: &Octree, law: Law, x: &[Vector3<f
 /// The same under the tension of the positions `at`, whose share of the stiffness is half.
 fn tense(simd: Simd, octree: &Octree, [x, at]: [&[Vector3<f64>]; 2], density_kg_m3: f64) -> Updated {
     let mut stiffness = CellStiffness::new(simd, octree, &[HARD, HARDER]);
-    let tension = Tension { at, start: at, s: 0.5 * SCALE, density_kg_m3, damping: 0.0 };
+    let tension = Tension { at, start: at, s: 0.5 * SCALE, density_kg_m3, damping: 0.0, definite: true };
     let inverted = stiffness.update(&mut Team::new(2).unwrap(), &with(Law::Corotational), x, Some(&tension));
     let (f, diagonal) = read(&stiffness, x.len());
     Updated { stiffness, f, diagonal, inverted }
@@ -560,7 +560,8 @@ fn forces_of_damping_are_those_of_the_rate_of_strain_and_rotations_cause_none() 
         for simd in [Simd::Baseline, Simd::detect()] {
             let damped = |start: &[Vector3<f64>]| {
                 let mut stiffness = CellStiffness::new(simd, &octree, &[HARD, HARDER]);
-                let tension = Tension { at: start, start, s: SCALE, density_kg_m3: 1e9, damping: 2.5 };
+                let tension =
+                    Tension { at: start, start, s: SCALE, density_kg_m3: 1e9, damping: 2.5, definite: true };
                 stiffness.update(&mut Team::new(2).unwrap(), &with(Law::Corotational), &x, Some(&tension));
                 read(&stiffness, x.len()).0
             };
