@@ -83,6 +83,10 @@ pub(super) fn step_seconds(
 
 /// The cheaper of the two ways.
 pub(super) fn cheapest(law: Law, pieces: usize, solver: (PcgSettings, Method)) -> OperatorChoice {
+    // A tangent of more terms than Hooke's law is always assembled.
+    if !law.is_hookean() {
+        return OperatorChoice::Assembled;
+    }
     let [free, assembled] = [false, true].map(|way| step_seconds(law, pieces, solver, way));
     if assembled < free { OperatorChoice::Assembled } else { OperatorChoice::MatrixFree }
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use scindo_algebra::assembly::Tangent;
 use scindo_algebra::solver::{NewtonReport, NewtonSettings, Potential, StopReason};
 use scindo_matter::element::Points;
-use scindo_matter::material::{Law, Rayleigh};
+use scindo_matter::material::Rayleigh;
 use scindo_matter::team::Team;
 use scindo_matter::team::phase::Phase;
 
@@ -144,7 +144,7 @@ impl ModelSolver {
         let increment = history.increment;
         // With a single solve Newmark's method gains energy where the body turns.
         let least = if report.scheme.is_newmark() { 2 } else { 1 };
-        let quadratic = matches!(self.model.law(), Law::Linear | Law::Corotational);
+        let quadratic = self.model.law().is_hookean();
         let steps = match quadratic && !ruined && self.active.springs.is_empty() {
             true => settings.steps.max(least),
             false => settings.steps.max(LEAST_NEWTON_STEPS),

@@ -22,12 +22,14 @@
 
 mod coarse;
 mod commit;
+mod equations;
 mod equilibrium;
 mod operator;
 mod spring_terms;
 pub(super) mod together;
 
 use coarse::two_level;
+use equations::StepEquations;
 use nalgebra::{Matrix3, Vector3};
 use scindo_algebra::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, LinearOperator, Padded, Spring, StiffModes, Stiffness,
@@ -56,10 +58,6 @@ use super::step_inputs::{Inertia, KnownLoads, LinearInputs, Predictor, StepOutco
 /// Part of the residual that a solve leaves on the way to an equilibrium of a law that rotates, at most; the last
 /// one reaches the tolerance.
 const FORCING: f64 = 0.1;
-/// The equations of a step in motion hold once their residual is this many times the tolerance of its linear solves.
-const EQUATIONS: f64 = 10.0;
-/// A residual below this that a solve has not halved is rounding: forces in single precision tell no more of it.
-const ROUNDED: f64 = 1e-3;
 /// Largest number of passes of a linear solve, repeated while springs open, close, slip or reach their cap.
 const SPRING_PASSES: usize = 8;
 /// The residual is measured against the right-hand side, but at least against this fraction of the loads.
@@ -116,9 +114,10 @@ pub struct LinearStep {
     descent: Descent,
     /// Relative residual at the start of the last solve.
     began: f64,
-    /// The least one at the start of a solve of this step, and how far the last solve moved the predictor [m].
-    least: f64,
+    /// How far the last solve moved the predictor [m].
     last: Vec<Padded>,
+    /// Whether the equations of a step in motion hold.
+    equations: StepEquations,
     /// For relaxation: loads that its search began with, and positions where the last step ended.
     searched: Option<KnownLoads>,
     ended: Vec<Vector3<f64>>,
@@ -258,7 +257,7 @@ impl LinearStep {
         }
         let mut solve = LinearReport::default();
         let (mut inverted_pieces, mut finite, mut solves, mut backtracks) = (0, true, 0, 0);
-        self.least = f64::INFINITY;
+        self.equations.begin();
         let mut began = f64::INFINITY;
         self.descent.begin();
         for number in 0..inputs.solves.max(1) {
@@ -275,6 +274,10 @@ impl LinearStep {
             if solve.stop == StopReason::NoDescent && inputs.moves() {
                 backtracks += 1;
                 self.take_back(0.5);
+                continue;
+            }
+            // Compressed material may have no minimum along a direction; from then on its tangent is projected.
+            if solve.stop == StopReason::NonPositiveCurvature && self.equations.project(inputs) {
                 continue;
             }
             let is_last = number + 1 >= inputs.solves;
@@ -307,6 +310,8 @@ impl LinearStep {
         if solve.stop == StopReason::NoDescent && inputs.moves() {
             self.take_back(1.0);
         }
+        let judges = inputs.is_nonlinear() && inputs.solves > 1 && finite && !team.told_to_stop();
+        let rounding = if judges { self.equations.judge(inputs.solver.tolerance, &mut solve) } else { 0.0 };
         // Otherwise the state stays as it was before the step.
         let work_j = if finite { self.commit(team, state, inputs, spring_forces) } else { 0.0 };
         team.begin(Phase::Guards);
@@ -317,7 +322,7 @@ impl LinearStep {
             self.ended.clone_from(&state.x);
         }
         let (refused_springs, backtracks) = (self.springs.refused(), backtracks + self.descent.backtracks);
-        StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, work_j, finite }
+        StepOutcome { solve, solves, rounding, inverted_pieces, refused_springs, backtracks, work_j, finite }
     }
 
     /// Makes one linear solve for δ, repeated while springs open, close or reach their cap in it.
@@ -341,6 +346,7 @@ impl LinearStep {
             self.residual(team, elastic, state, inputs, (pass, first));
             team.begin(Phase::Solve);
             let report = self.solve(team, elastic, inputs, (pass, first));
+            self.equations.foresee(report.residual);
             // A pass with nothing left to do estimates no error, and a solve that was not made leaves the one before.
             let algebraic_error = solve.algebraic_error.max(report.algebraic_error);
             let iterations = solve.iterations + report.iterations;
@@ -536,6 +542,7 @@ impl LinearStep {
                 }
             };
             self.reference = self.least_reference(loads, inputs);
+            self.note_rounding(team, inputs);
         }
         // Springs reach few copies: they are added one by one.
         for spring in &self.springs.springs {
@@ -550,10 +557,11 @@ impl LinearStep {
     }
 
     /// Least reference of the residual, given the norm √(fᵀM⁻¹f) of the `loads`. For an equilibrium it is
-    /// that norm, or a fraction of √(2Ψ) if displacements alone load the body.
+    /// that norm, or a fraction of √(2Ψ) if displacements alone load the body. The equations of a law that is nonlinear
+    /// in the stretch are judged as those of equilibria.
     fn least_reference(&self, loads: f64, inputs: &LinearInputs<'_>) -> f64 {
         if inputs.moves() {
-            return LOAD_FLOOR * loads;
+            return if inputs.is_nonlinear() { loads } else { LOAD_FLOOR * loads };
         }
         loads.max(LEAST_REFERENCE * (2.0 * self.stored.max(0.0)).sqrt())
     }
@@ -585,11 +593,12 @@ impl LinearStep {
             return level.solve(team, (&mut A, exact), fixed, delta, from);
         }
         if pass == 0
-            && let Some(none) = without_solve(self.began, &mut self.least, first, inputs)
+            && inputs.moves()
+            && let Some(none) = self.equations.look(norm, self.reference, first, inputs)
         {
             return none;
         }
-        let mut until = inputs.solver;
+        let mut until = self.equations.until(inputs);
         // A residual that is small enough ends the search; nothing is left to solve for.
         let searches = inputs.descends() && self.began > until.tolerance;
         let corrects = searches && pass == 0;
@@ -619,28 +628,6 @@ impl LinearStep {
         }
         report
     }
-}
-
-/// The report of a solve of a step in motion that is not made: because the equations hold at its start, or because the
-/// residual there is larger than the `least` one so far.
-fn without_solve(
-    began: f64,
-    least: &mut f64,
-    first: bool,
-    inputs: &LinearInputs<'_>,
-) -> Option<LinearReport> {
-    if !inputs.moves() {
-        return None;
-    }
-    let rounding = *least < ROUNDED && began > 0.5 * *least;
-    if !first && (rounding || began <= EQUATIONS * inputs.solver.tolerance) {
-        return Some(LinearReport::default());
-    }
-    if began > *least {
-        return Some(LinearReport { stop: StopReason::NoDescent, ..LinearReport::default() });
-    }
-    *least = began;
-    None
 }
 
 /// Multigrid, if the springs of the present solve allow cycles.

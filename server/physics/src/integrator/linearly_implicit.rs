@@ -25,6 +25,9 @@ use super::together::Member;
 use crate::space::OctreeSpace;
 use crate::space::Space;
 
+/// Residual above which the equations of a step in motion are not solved at all.
+const UNSOLVED: f64 = 0.01;
+
 /// A step that fails is tried again in 2 and then in 4 parts.
 const MOST_HALVINGS: u32 = 2;
 
@@ -118,7 +121,8 @@ impl LinearlyImplicit {
         (scheme, inputs): (Scheme, &StepInputs<'_>),
         (report, spring_forces): (&mut SolveReport, &mut [Vector3<f64>]),
     ) -> bool {
-        (report.residual, report.algebraic_error, report.internal_work_j) = (0.0, 0.0, 0.0);
+        (report.residual, report.rounding) = (0.0, 0.0);
+        (report.algebraic_error, report.internal_work_j) = (0.0, 0.0);
         for _ in 0..report.substeps {
             let inertia = match course.multistep.extrapolate(team, state, (scheme, inputs.h)) {
                 Some(history) => Inertia::Remembered(history),
@@ -126,17 +130,21 @@ impl LinearlyImplicit {
                 None => Inertia::Euler,
             };
             let solves = match scheme {
-                _ if self.careful && !self.limited && scheme != Scheme::Static => MOST_SOLVES,
-                Scheme::ImplicitEuler => 1,
+                _ if self.careful && !self.limited && scheme != Scheme::Static => {
+                    self.solves.max(MOST_SOLVES)
+                }
+                Scheme::ImplicitEuler if self.material.law.is_hookean() => 1,
                 _ => self.solves,
             };
             let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
             let inputs = LinearInputs { step: *inputs, mass_f32, material, solver: *pcg, inertia, solves };
-            let StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, work_j, finite } =
-                step.step(team, &mut **stiffness, state, &inputs, spring_forces);
+            let outcome = step.step(team, &mut **stiffness, state, &inputs, spring_forces);
+            let StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, work_j, .. } =
+                outcome;
             report.newton_steps += solves;
             report.iterations += solve.iterations;
             report.residual = report.residual.max(solve.residual);
+            report.rounding = report.rounding.max(outcome.rounding);
             report.stop = solve.stop;
             self.limited = solve.stop == StopReason::IterationLimit;
             // δ minimises s times an energy, so its norm is in √J times √s.
@@ -145,7 +153,7 @@ impl LinearlyImplicit {
             report.refused_springs = refused_springs;
             report.backtracks += backtracks;
             report.internal_work_j += work_j;
-            if !finite {
+            if !outcome.finite {
                 return false;
             }
             if team.told_to_stop() {
@@ -230,7 +238,9 @@ impl StepSolver for LinearlyImplicit {
             if team.told_to_stop() {
                 return;
             }
-            if finite {
+            // The equations of a nonlinear law are solved where a shorter step begins closer to them.
+            let unsolved = report.rounding > 0.0 && report.residual > UNSOLVED.max(report.rounding);
+            if finite && !(unsolved && failed < MOST_HALVINGS) {
                 let (now, put_in) = if turns { self.free_energy(state, &inputs) } else { (0.0, 0.0) };
                 // Gravity and loads may do work; any further gain comes from the linearisation.
                 let (gain, work) = (now - start.0, put_in - start.1);
@@ -348,7 +358,7 @@ impl StepSolver for LinearlyImplicit {
     }
 
     fn can_step_together(&self) -> bool {
-        self.scheme != Scheme::Static && self.step.can_be_shared()
+        self.scheme != Scheme::Static && self.material.law.is_hookean() && self.step.can_be_shared()
     }
 
     fn member<'a>(

@@ -18,8 +18,9 @@ use super::spin::SpinGuard;
 use super::state::State;
 use super::step_inputs::{StepHistory, StepInputs};
 
-/// Most linear solves of a step whose equations are to hold.
+/// Most linear solves of a step whose equations are to hold, and of laws that are nonlinear in the stretch.
 pub(super) const MOST_SOLVES: u32 = 8;
+const NONLINEAR_SOLVES: u32 = 20;
 
 /// A change of the elements that leaves the material whole.
 #[derive(Clone, Copy, Debug)]
@@ -150,7 +151,7 @@ impl Multistep {
         spin: &mut SpinGuard,
     ) -> (Scheme, Option<Notice>) {
         let h = inputs.h;
-        let mut turn = || match law.rotates() || self.judges_all {
+        let mut turn = || match law != Law::Linear || self.judges_all {
             true => h * spin.fastest(state, inputs.mass, inputs.parts),
             false => 0.0,
         };
@@ -231,10 +232,15 @@ impl Multistep {
         Some(StepHistory { increment, x_a: &self.x_a, x_v: &self.x_v })
     }
 
-    /// Most linear solves per step. Where the body may turn, Newmark's method needs several, until its equations hold:
-    /// it has no damping of its own, so that what one solve leaves would add up.
+    /// Most linear solves per step. Laws that are nonlinear in the stretch need several, until the equations of the step
+    /// hold, and where the body may turn Newmark's method does, too: it has no damping of its own, so that what one solve
+    /// leaves would add up.
     pub fn solves(scheme: Scheme, law: Law) -> u32 {
-        if matches!(scheme, Scheme::Newmark { .. }) && law.rotates() { MOST_SOLVES } else { 1 }
+        match law {
+            Law::StVenantKirchhoff | Law::NeoHookean => NONLINEAR_SOLVES,
+            Law::Corotational if scheme.is_newmark() => MOST_SOLVES,
+            Law::Corotational | Law::Linear => 1,
+        }
     }
 
     /// Begins the energy balance of a step, with the kinetic energy and that of loads and springs [J]; `stored`

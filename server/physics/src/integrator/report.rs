@@ -17,6 +17,9 @@ pub struct SolveReport {
     pub residual: f64,
     /// Value that `residual` has to reach; 0 if nothing is solved, as in explicit integrators.
     pub tolerance: f64,
+    /// Residual that rounding may leave of equations whose forces are in single precision. It counts as reached; 0 where
+    /// the tolerance alone decides.
+    pub rounding: f64,
     /// Why the last linear or Newton solve stopped.
     pub stop: StopReason,
     /// Whether the body advanced, and if not, why.
@@ -49,7 +52,9 @@ impl SolveReport {
     /// the largest of its value at the start of the step, that of the loads (1 % of it on the fast path in motion) and,
     /// in equilibria and Newton's method, a small part of √(2Ψ).
     pub fn is_unconverged(&self) -> bool {
-        self.outcome == Outcome::Advanced && self.tolerance > 0.0 && self.residual > self.tolerance
+        self.outcome == Outcome::Advanced
+            && self.tolerance > 0.0
+            && self.residual > self.tolerance.max(self.rounding)
     }
 
     /// Whether energy came from nowhere again in this step and those just before it: the body may shake for ever.

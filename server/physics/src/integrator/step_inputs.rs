@@ -156,6 +156,12 @@ impl LinearInputs<'_> {
         !matches!(self.inertia, Inertia::None { .. })
     }
 
+    /// Whether the step moves material whose law is nonlinear in the stretch, so that it takes solves until its equations
+    /// hold.
+    pub(super) fn is_nonlinear(&self) -> bool {
+        self.moves() && !self.material.law.is_hookean()
+    }
+
     /// Whether the step is an equilibrium whose stiffness turns with the material, so that its solves need a line
     /// search.
     pub(super) fn descends(&self) -> bool {
@@ -253,6 +259,8 @@ pub struct StepOutcome {
     pub solve: LinearReport,
     /// Linear solves made.
     pub solves: u32,
+    /// Residual that rounding may leave of the equations of the step; 0 where a linear solve makes it.
+    pub rounding: f64,
     /// Pieces with det F ≤ 0 at the predictor.
     pub inverted_pieces: usize,
     /// Springs left out because one of their numbers is unusable.

@@ -208,7 +208,8 @@ fn what_does_not_go_together_is_refused() {
     };
     let with = settings();
     let single = BodySettings { arithmetic: Some(Arithmetic::Single), ..with };
-    refused(Law::NeoHookean, single, "single precision does not go with a law");
+    let many = BodySettings { newton_steps: Some(3), ..single };
+    refused(Law::NeoHookean, many, "single precision does not go with more than one Newton step");
     refused(Law::Corotational, BodySettings { scheme: Scheme::Static, ..single }, "the static integrator");
     refused(Law::Linear, BodySettings { scheme: Scheme::Rk4, ..single }, "an explicit integrator");
     refused(Law::Linear, BodySettings { method: Method::Cholesky, ..single }, "a solver other than pcg");

@@ -19,6 +19,7 @@ mod half_cut_beam;
 mod hex8_cubes;
 mod inclined;
 mod multigrid;
+mod nonlinear;
 mod multistep;
 mod octree;
 mod octree_statics;

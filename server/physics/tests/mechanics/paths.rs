@@ -37,13 +37,15 @@ fn word(law: Law) -> &'static str {
 }
 
 /// How a step of these settings is solved.
-fn path(settings: &BodySettings, law: Law) -> &'static str {
+fn path(settings: &BodySettings, law: Law) -> String {
     settings.check(law).unwrap();
     match (settings.why_general(law), settings.scheme, law.rotates()) {
-        (Some(_), ..) => "general",
-        (None, Scheme::Static, true) => "fast, with a line search",
-        (None, scheme, _) if Multistep::solves(scheme, law) > 1 => "fast, up to 8 solves",
-        _ => "fast",
+        (Some(_), ..) => "general".into(),
+        (None, Scheme::Static, true) => "fast, with a line search".into(),
+        (None, scheme, _) => match Multistep::solves(scheme, law) {
+            1 => "fast".into(),
+            solves => format!("fast, up to {solves} solves"),
+        },
     }
 }
 
@@ -80,7 +82,7 @@ fn table_of_paths() -> String {
             let first = |names: &[String]| {
                 SCHEMES.iter().position(|(name, _)| names[0] == format!("`{name}`")).unwrap()
             };
-            let cells: Vec<&str> = columns.iter().map(|(names, _)| cells[first(names)]).collect();
+            let cells: Vec<String> = columns.iter().map(|(names, _)| cells[first(names)].clone()).collect();
             writeln!(text, "| {} | {law} | {} |", elements.join("; "), cells.join(" | ")).unwrap();
         }
     }

@@ -2,7 +2,7 @@
 //! after a cut.
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Body, BodySettings, Method, Notice, Outcome, Scheme, StopReason};
+use scindo_physics::body::{Arithmetic, Body, BodySettings, Method, Notice, Outcome, Scheme, StopReason};
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
@@ -48,7 +48,13 @@ fn unconverged_means_the_same_on_every_path() {
         ("general, one solve", Law::Corotational, bdf2(2000), true),
         ("general, one factorisation", Law::Corotational, direct, true),
         ("newton", Law::StVenantKirchhoff, BodySettings { newton_steps: Some(3), ..solver(3) }, false),
-        ("newton", Law::StVenantKirchhoff, solver(2000), true),
+        (
+            "newton",
+            Law::StVenantKirchhoff,
+            BodySettings { arithmetic: Some(Arithmetic::Double), ..solver(2000) },
+            true,
+        ),
+        ("fast, several solves", Law::StVenantKirchhoff, solver(2000), true),
     ];
     for (name, law, settings, enough) in cases {
         let mut body = held(law, settings);
@@ -57,10 +63,12 @@ fn unconverged_means_the_same_on_every_path() {
             assert_eq!(report.outcome, Outcome::Advanced);
             assert_eq!(report.tolerance, 1e-6);
             assert_eq!(report.is_unconverged(), !enough, "{name}, step {step}: {report:?}");
-            assert_eq!(report.is_unconverged(), report.residual > report.tolerance);
-            if enough {
-                assert_eq!(report.stop, StopReason::Converged, "{name}, step {step}: {report:?}");
-            }
+            // Rounding ends the solves of a nonlinear law in single precision.
+            let (reached, rounding) = (report.residual <= report.tolerance, report.rounding);
+            assert_eq!(report.is_unconverged(), !(reached || report.residual <= rounding));
+            assert!(rounding == 0.0 || (1e-6..0.1).contains(&rounding), "{name}, step {step}: {report:?}");
+            let stop = if reached { StopReason::Converged } else { StopReason::Stagnated };
+            assert!(!enough || report.stop == stop, "{name}, step {step}: {report:?}");
         }
     }
 }

@@ -178,7 +178,8 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
     );
     for (line, needed) in [
         ("integrator = \"rk4\"", "an implicit integrator of motion"),
-        ("law = \"stvk\"", "steps by linear solves in single precision"),
+        ("law = \"stvk\"", "the law linear or corotational"),
+        ("element = \"tet10\"", "steps by linear solves in single precision"),
     ] {
         let text = GOOD.replace("[world]", "[effects]\nself_collision = true\n[world]");
         let error = Scene::from_toml(&text.replace("young_pa", &format!("{line}\nyoung_pa"))).unwrap_err();
@@ -256,8 +257,14 @@ mass = "floored""#,
         ),
         (
             r#"law = "neo-hookean"
+element = "octree"
 solver = { precision = "single" }"#,
             &["`single` with a law that is nonlinear", "mixed, double"],
+        ),
+        (
+            r#"law = "stvk"
+solver = { operator = "matrix-free" }"#,
+            &["solver.operator", "`matrix-free` with stvk", "assembled"],
         ),
         (r#"solver = { precision = "single", newton_steps = 2 }"#, &["more than one Newton step"]),
         (r#"solver = { precision = "single", method = "cg" }"#, &["a solver other than pcg"]),

@@ -3,6 +3,7 @@
 use scindo_algebra::operator::BlockJacobi;
 use scindo_algebra::solver::Method;
 use scindo_algebra::solver::two_level::{CoarseSpace, CoarseSystem, TwoLevel};
+use scindo_matter::material::Law;
 
 use super::LinearStep;
 use crate::integrator::step_inputs::LinearInputs;
@@ -24,7 +25,7 @@ impl LinearStep {
         let with = inputs.elastic_update();
         coarse.follow(&CoarseSystem {
             x: &self.predicted,
-            rotates: with.law.rotates(),
+            rotates: with.law != Law::Linear,
             scale: with.scale,
             mass_factor: inputs.mass_factor(),
             diagonal: &self.diagonal,

@@ -5,6 +5,7 @@ use scindo_algebra::operator::{
     BLOCK, CompositeDiagonal, Stiffness, Tension, apply_damping, block_of, invert, invert_free, padded,
 };
 use scindo_matter::element::{FixedCopy, Held};
+use scindo_matter::material::Law;
 use scindo_matter::team::phase::Phase;
 use scindo_matter::team::{Team, blocks};
 
@@ -34,8 +35,10 @@ impl LinearStep {
             s: inputs.s(),
             density_kg_m3: if inputs.moves() { inputs.material.density_kg_m3 } else { 0.0 },
             damping: if self.damps_by_strain(inputs) { beta / h } else { 0.0 },
+            definite: self.equations.definite,
         };
-        let inverted = elastic.update(team, &with, at, (!self.ablation.twists).then_some(&tension));
+        let with_tension = !self.ablation.twists || !inputs.material.law.is_hookean();
+        let inverted = elastic.update(team, &with, at, with_tension.then_some(&tension));
         self.sum_chunks(team, elastic, inputs);
         // Without inertia, single-precision forces would be too coarse for the residual.
         if !inputs.moves() {
@@ -64,7 +67,7 @@ impl LinearStep {
     /// Whether the forces of the update contain those of damping: in implicit Euler of a law that rotates.
     pub(super) fn damps_by_strain(&self, inputs: &LinearInputs<'_>) -> bool {
         matches!(inputs.inertia, Inertia::Euler)
-            && inputs.material.law.rotates()
+            && inputs.material.law != Law::Linear
             && !self.ablation.predictor
             && !self.ablation.twists
     }

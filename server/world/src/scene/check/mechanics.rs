@@ -283,7 +283,7 @@ impl Check<'_> {
             Some(RawPrecision::Single) => {
                 if let Some(why) = m.why_general() {
                     let what = format!("found `single` with {why}, allowed: mixed, double");
-                    let next = "single precision needs tet4, octree or hex8 on equal cubes, linear or corotational, implicit-euler, bdf2 or newmark (static with the linear law, or octree), pcg, two-level-pcg or multigrid, \
+                    let next = "single precision needs tet4, octree or hex8 on equal cubes, linear or corotational (any law with tet4), implicit-euler, bdf2 or newmark (static with the linear law, or octree), pcg, two-level-pcg or multigrid, \
                                 lumped mass, no fibres, no viscoelasticity, no locking remedy and one Newton step";
                     self.conflict(key, what, next);
                 }
@@ -311,6 +311,11 @@ impl Check<'_> {
             );
         }
         if m.arithmetic() == Arithmetic::Single {
+            if found == RawOperator::MatrixFree && !m.constitutive_law().is_hookean() {
+                let what = format!("found `{}` with {}, allowed: assembled", word(&found), word(&m.law));
+                let next = "remove it; a tangent that is nonlinear in the stretch is kept as blocks";
+                self.conflict(format!("{at}.solver.operator"), what, next);
+            }
             return;
         }
         let why = m.why_general().unwrap_or("the chosen precision");

@@ -27,6 +27,8 @@ impl Check<'_> {
                         Some("an implicit integrator of motion")
                     } else if body.octree.is_some_and(|octree| octree.simulate_level > 0) {
                         Some("octree.simulate_level = 0")
+                    } else if !mechanics.constitutive_law().is_hookean() {
+                        Some("the law linear or corotational")
                     } else {
                         mechanics.why_general().map(|_| "steps by linear solves in single precision")
                     };
