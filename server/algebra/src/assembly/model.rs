@@ -84,6 +84,11 @@ impl Model {
         self.point.lame = lame;
     }
 
+    /// Whether the material becomes stiffer as it is stretched.
+    pub fn stiffens(&self) -> bool {
+        !self.fibres.is_empty() || !self.law().is_hookean()
+    }
+
     /// Puts families of fibres into all elements.
     ///
     /// # Errors

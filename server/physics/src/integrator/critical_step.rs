@@ -22,6 +22,16 @@ const MOST_PRODUCTS: usize = 300;
 const CONVERGED: f64 = 1e-12;
 const CALM: usize = 8;
 
+/// ω_max² [1/s²] of a body, and what it was computed for.
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+pub(super) struct Frequency {
+    pub omega_squared: f64,
+    /// Looks until it is computed again.
+    pub left: u32,
+    /// The largest squared stretch that the body had.
+    pub largest: f64,
+}
+
 /// Buffers of the iteration, one entry per node.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct PowerIteration {

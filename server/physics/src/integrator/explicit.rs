@@ -2,13 +2,13 @@
 
 use nalgebra::Vector3;
 use scindo_algebra::assembly::Tangent;
-use scindo_matter::element::FixedCopy;
+use scindo_matter::element::Points;
 use scindo_matter::material::Law;
 use scindo_matter::team::Team;
 use scindo_matter::team::phase::Phase;
 
 use super::course::Course;
-use super::critical_step::stable_step;
+use super::critical_step::{Frequency, stable_step};
 use super::model_solver::{ModelSolver, finite};
 use super::notice::Notice;
 use super::report::{Outcome, SolveReport};
@@ -18,10 +18,12 @@ use super::step_inputs::StepInputs;
 
 /// Fraction of the longest stable step that is used.
 const MARGIN: f64 = 0.95;
-/// Steps after which ω_max is computed again, for a body whose stiffness changes.
+/// Looks at ω_max after which it is computed again, for a body whose stiffness changes.
 const RECHECK: u32 = 128;
-/// A step that did not stay finite is tried again with sub-steps half, then a quarter as long.
-const RETRIES: u32 = 2;
+/// Growth of the largest squared stretch of a body after which ω_max is computed again.
+const STIFFER: f64 = 1.02;
+/// A step that did not stay finite, or whose material stiffened in it, is tried again with shorter sub-steps, so often.
+const RETRIES: u32 = 3;
 
 impl ModelSolver {
     /// Makes the step. If it would take too many parts, it is refused.
@@ -33,63 +35,86 @@ impl ModelSolver {
         report: &mut SolveReport,
     ) {
         let before = &course.before;
-        let stable_s = self.stable_step(team, before, inputs.fixed);
-        report.stable_step_s = Some(stable_s);
-        let parts = (inputs.h / (MARGIN * stable_s) * (1.0 - 1e-9)).ceil().max(1.0);
-        // The cast saturates: a stable step of length zero needs more parts than anyone allows.
-        let needed = if parts.is_nan() { u32::MAX } else { parts as u32 };
-        if needed > self.settings.most_substeps.max(1) {
-            report.outcome = Outcome::Refused;
-            report.notice = Some(Notice::TooLong { h_s: inputs.h, stable_s, needed });
-            return;
-        }
-        for retry in 0..=RETRIES {
-            report.substeps = needed << retry;
-            report.notice = match (retry, report.substeps) {
-                (0, 1) => None,
-                (0, substeps) => Some(Notice::Divided { substeps, stable_s }),
-                (_, substeps) => Some(Notice::DividedAgain { substeps }),
-            };
-            let h = inputs.h / f64::from(report.substeps);
-            state.copy_from(before);
-            // Prescribed nodes move at the constant velocity that reaches their target.
-            for f in inputs.fixed {
-                let c = f.copy as usize;
-                f.held.clear(&mut state.v[c]);
-                state.v[c] += f.held.gap(&before.x[c], &f.position_m) / inputs.h;
-            }
-            for k in 1..=report.substeps {
-                if team.told_to_stop() {
-                    return;
-                }
-                let part = (h, f64::from(k) / f64::from(report.substeps));
-                self.substep(team, (before, state), inputs, part);
-            }
-            if finite(state) {
+        let mut stable_s = self.stable_step(team, before, inputs);
+        let mut substeps = parts(inputs.h, stable_s);
+        report.notice = (substeps > 1).then_some(Notice::Divided { substeps, stable_s });
+        for _ in 0..=RETRIES {
+            report.stable_step_s = Some(stable_s);
+            report.substeps = substeps;
+            if substeps > self.settings.most_substeps.max(1) {
+                report.outcome = Outcome::Refused;
+                report.notice = Some(Notice::TooLong { h_s: inputs.h, stable_s, needed: substeps });
                 return;
             }
+            self.substeps(team, before, state, inputs, substeps);
+            if team.told_to_stop() {
+                return;
+            }
+            if !finite(state) {
+                substeps = substeps.saturating_mul(2);
+                report.notice = Some(Notice::DividedAgain { substeps });
+                continue;
+            }
+            if !self.model.stiffens() {
+                return;
+            }
+            // Material that has stiffened on the way needs parts that are stable at its end, too.
+            stable_s = stable_s.min(self.stable_step(team, state, inputs));
+            let needed = parts(inputs.h, stable_s);
+            if needed <= substeps {
+                return;
+            }
+            substeps = needed;
+            report.notice = Some(Notice::Divided { substeps, stable_s });
         }
         report.outcome = Outcome::Held;
     }
 
-    /// Longest stable step [s], including the springs of this step.
-    fn stable_step(&mut self, team: &mut Team, state: &State, fixed: &[FixedCopy]) -> f64 {
-        // Body and springs are bounded apart: springs change with every step, ω_max of the body does not.
-        let body = match self.omega_squared {
-            Some((omega_squared, left)) if left > 0 || self.model.law() == Law::Linear => {
-                self.omega_squared = Some((omega_squared, left.saturating_sub(1)));
-                omega_squared
+    /// Makes a step in so many parts.
+    fn substeps(
+        &mut self,
+        team: &mut Team,
+        before: &State,
+        state: &mut State,
+        inputs: &StepInputs<'_>,
+        substeps: u32,
+    ) {
+        let h = inputs.h / f64::from(substeps);
+        state.copy_from(before);
+        // Prescribed nodes move at the constant velocity that reaches their target.
+        for f in inputs.fixed {
+            let c = f.copy as usize;
+            f.held.clear(&mut state.v[c]);
+            state.v[c] += f.held.gap(&before.x[c], &f.position_m) / inputs.h;
+        }
+        for k in 1..=substeps {
+            if team.told_to_stop() {
+                return;
             }
-            _ => {
+            let part = (h, f64::from(k) / f64::from(substeps));
+            self.substep(team, (before, state), inputs, part);
+        }
+    }
+
+    /// Longest stable step [s], including the springs of this step.
+    fn stable_step(&mut self, team: &mut Team, state: &State, inputs: &StepInputs<'_>) -> f64 {
+        // Body and springs are bounded apart: springs change with every step, ω_max of the body hardly does.
+        let largest = if self.model.stiffens() { largest_stretch(inputs.points, &state.x) } else { 0.0 };
+        let known = self.frequency.take().filter(|known| {
+            self.model.law() == Law::Linear || (known.left > 0 && largest <= STIFFER * known.largest)
+        });
+        let body = match known {
+            Some(known) => Frequency { left: known.left.saturating_sub(1), ..known },
+            None => {
                 let K = self.tangent.get_or_insert_with(|| self.model.pattern());
                 self.model.tangent(&state.x, Tangent::Projected, K);
-                let omega_squared = self.power.omega_max(team, K, &mut self.mass, fixed).powi(2);
-                self.omega_squared = Some((omega_squared, RECHECK));
-                omega_squared
+                let omega = self.power.omega_max(team, K, &mut self.mass, inputs.fixed);
+                Frequency { omega_squared: omega.powi(2), left: RECHECK, largest }
             }
         };
+        self.frequency = Some(body);
         let springs = self.power.spring_bound(&self.active.springs, &self.mass.lumped);
-        stable_step(self.settings.scheme, (body + springs).sqrt(), self.material.rayleigh)
+        stable_step(self.settings.scheme, (body.omega_squared + springs).sqrt(), self.material.rayleigh)
     }
 
     /// Makes one part of length `h` [s], which ends at the fraction `s` of the step from `before`.
@@ -173,6 +198,20 @@ impl ModelSolver {
         hold(inputs.fixed, a);
         team.begin(Phase::Commit);
     }
+}
+
+/// Number of parts of a step of `h` [s].
+fn parts(h: f64, stable_s: f64) -> u32 {
+    let parts = (h / (MARGIN * stable_s) * (1.0 - 1e-9)).ceil().max(1.0);
+    // The cast saturates: a stable step of length zero needs more parts than anyone allows.
+    if parts.is_nan() { u32::MAX } else { parts as u32 }
+}
+
+/// Largest ‖F‖² of a body.
+fn largest_stretch(points: &dyn Points, x: &[Vector3<f64>]) -> f64 {
+    let mut largest = 0.0_f64;
+    points.for_points(x, &mut |point| largest = largest.max(point.F.norm_squared()));
+    largest
 }
 
 /// y += s x.

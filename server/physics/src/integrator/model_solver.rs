@@ -18,7 +18,7 @@ use scindo_matter::team::Team;
 
 use super::active_springs::ActiveSprings;
 use super::course::Course;
-use super::critical_step::PowerIteration;
+use super::critical_step::{Frequency, PowerIteration};
 use super::mass::Mass;
 use super::notice::Notice;
 use super::parts::Translations;
@@ -59,8 +59,8 @@ pub struct ModelSolver {
     pub(super) turned: Vec<Vector3<f64>>,
     pub(super) tangent: Option<BlockCsr<f64>>,
     pub(super) power: PowerIteration,
-    /// ω_max² [1/s²] without springs, and the number of explicit steps until it is computed again.
-    pub(super) omega_squared: Option<(f64, u32)>,
+    /// ω_max without springs, for explicit schemes.
+    pub(super) frequency: Option<Frequency>,
 }
 
 impl ModelSolver {
@@ -82,7 +82,7 @@ impl ModelSolver {
             turned: Vec::new(),
             tangent: None,
             power: PowerIteration::default(),
-            omega_squared: None,
+            frequency: None,
             model,
             material,
             settings,
@@ -104,7 +104,7 @@ impl ModelSolver {
             power.resize(n);
             self.tangent = Some(model.pattern());
         }
-        self.omega_squared = None;
+        self.frequency = None;
     }
 
     /// The model of `space` as it is cut now.
@@ -209,12 +209,12 @@ impl StepSolver for ModelSolver {
     }
 
     fn restart(&mut self) {
-        self.omega_squared = None;
+        self.frequency = None;
     }
 
     fn hold(&mut self, fixed: &[FixedCopy]) {
         self.mass.hold(fixed);
-        self.omega_squared = None;
+        self.frequency = None;
     }
 
     fn set_material(&mut self, material: Material) {
@@ -224,7 +224,7 @@ impl StepSolver for ModelSolver {
         let Material { law, density_kg_m3, .. } = self.material;
         self.material = Material { law, density_kg_m3, ..material };
         self.relaxation.forget();
-        self.omega_squared = None;
+        self.frequency = None;
     }
 
     fn set_solver(&mut self, settings: SolverSettings) {

@@ -94,3 +94,28 @@ fn slivers_keep_the_critical_step_and_are_stepped_for_five_seconds() {
         assert!(apart < 0.01 * sunk, "{mass:?}: {apart} m from the equilibrium, which sinks by {sunk} m");
     }
 }
+
+/// Slices that are cut loose swing, and stiffen as they are stretched: steps that were stable before are none then.
+#[test]
+fn material_that_stiffens_takes_shorter_steps() {
+    for law in [Law::StVenantKirchhoff, Law::NeoHookean] {
+        for scheme in [Scheme::SymplecticEuler, Scheme::Rk4] {
+            let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(0.1), [8; 3], BoxPattern::Tet6);
+            let settings = BodySettings { scheme, mass: MassKind::Floored, ..BodySettings::default() };
+            let mut body = Body::new(mesh, Material { law, ..MATERIAL }, settings).unwrap();
+            let held: Vec<u32> =
+                (0..).zip(body.rest_positions()).filter(|(_, X)| X.x == 0.0).map(|(n, _)| n).collect();
+            body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+            for step in 0..200_u32 {
+                if step >= 24 && step % 4 == 0 && step < 52 {
+                    // Beside nodes by three tenths of a cell, through all but the lowest layers.
+                    let at = 0.0125 * (f64::from((step - 24) / 4 + 1) + 0.3);
+                    let edge = |y: f64| [Vector3::new(at, y, -0.02), Vector3::new(at, y, 0.12)];
+                    body.cut(&BladeSweep { segments: vec![edge(-0.02), edge(0.08)] }, step).unwrap();
+                }
+                let report = body.step(0.005, DOWN, &[]);
+                assert_eq!(report.outcome, Outcome::Advanced, "{law:?} {scheme:?} {step}: {report:?}");
+            }
+        }
+    }
+}
