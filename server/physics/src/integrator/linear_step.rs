@@ -310,7 +310,7 @@ impl LinearStep {
         if solve.stop == StopReason::NoDescent && inputs.moves() {
             self.take_back(1.0);
         }
-        let judges = inputs.is_nonlinear() && inputs.solves > 1 && finite && !team.told_to_stop();
+        let judges = inputs.is_nonlinear() && finite && !team.told_to_stop();
         let rounding = if judges { self.equations.judge(inputs.solver.tolerance, &mut solve) } else { 0.0 };
         // Otherwise the state stays as it was before the step.
         let work_j = if finite { self.commit(team, state, inputs, spring_forces) } else { 0.0 };

@@ -159,7 +159,7 @@ impl LinearInputs<'_> {
     /// Whether the step moves material whose law is nonlinear in the stretch, so that it takes solves until its equations
     /// hold.
     pub(super) fn is_nonlinear(&self) -> bool {
-        self.moves() && !self.material.law.is_hookean()
+        self.moves() && self.solves > 1 && !self.material.law.is_hookean()
     }
 
     /// Whether the step is an equilibrium whose stiffness turns with the material, so that its solves need a line

@@ -41,6 +41,22 @@ fn fall(mut body: Body, steps: usize, h: f64) -> Body {
     body
 }
 
+/// One Newton step by request is solved to its tolerance, with a tangent that has a minimum.
+#[test]
+fn a_single_solve_reaches_its_tolerance() {
+    for law in [Law::StVenantKirchhoff, Law::NeoHookean] {
+        let solver = PcgSettings { iterations: 1000, tolerance: 1e-4 };
+        let settings = BodySettings { solver, newton_steps: Some(1), ..BodySettings::default() };
+        let mut body = bar(law, 0.0, settings);
+        for step in 0..20 {
+            let report = body.step(0.01, DOWN, &[]);
+            assert!(body.is_fast() && report.newton_steps == 1, "{law:?} {step}: {report:?}");
+            assert_eq!(report.stop, StopReason::Converged, "{law:?} {step}: {report:?}");
+            assert!(report.residual <= 1e-4, "{law:?} {step}: {report:?}");
+        }
+    }
+}
+
 #[test]
 fn the_fast_path_moves_as_the_general_one() {
     let newmark = Scheme::Newmark { beta: 0.25, gamma: 0.5 };

@@ -35,7 +35,8 @@ impl LinearStep {
             s: inputs.s(),
             density_kg_m3: if inputs.moves() { inputs.material.density_kg_m3 } else { 0.0 },
             damping: if self.damps_by_strain(inputs) { beta / h } else { 0.0 },
-            definite: self.equations.definite,
+            // A single solve has to find a minimum.
+            definite: self.equations.definite || inputs.solves == 1,
         };
         let with_tension = !self.ablation.twists || !inputs.material.law.is_hookean();
         let inverted = elastic.update(team, &with, at, with_tension.then_some(&tension));
