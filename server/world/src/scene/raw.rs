@@ -590,7 +590,7 @@ impl RawBody {
 pub enum RawMoves {
     /// None: the cut follows the faces where they are and is jagged.
     None,
-    /// Those whose elements stay well shaped. Others stay off the sweep.
+    /// Those whose elements stay well shaped. Elsewhere elements are divided along the sweep.
     #[default]
     Sound,
     /// As many as can without inverting an element. Elements between them are pressed flat and then removed, if `clean`

@@ -1,19 +1,21 @@
 //! Cutting along element faces, with nodes moved onto the sweep.
 //!
 //! This is the other way to cut a body: it changes the element mesh itself. The number of elements stays
-//! nearly the same, and every element stays an ordinary one. Four steps in sequence:
+//! nearly the same, and every element stays an ordinary one. By default four steps follow each other:
 //!
-//! 1. [`select`]: the sweep is intersected with the edges of the mesh, each crossing marks the nearer
-//!    node, and faces whose three nodes are marked form the cut surface.
-//! 2. [`relocate`]: nodes of the cut surface are moved onto the sweep, in the reference and in the
-//!    deformed configuration at once.
+//! 1. [`relocate`]: the sweep is intersected with the edges of the mesh. Nodes of crossed edges are moved onto the
+//!    sweep, in the reference and in the deformed configuration at once, where the elements around stay well shaped.
+//! 2. [`subdivide`]: elements are divided at crossed edges neither end of which could be moved. Faces with three nodes
+//!    on the sweep form the cut surface.
 //! 3. [`dissect`]: nodes are duplicated by the connected components of the elements around them.
 //! 4. [`clean`]: degenerate elements are removed by splitting and collapsing edges.
 //!
-//! [`SnapSettings`] leaves out 2, 4 or both, for comparisons.
+//! For comparisons, [`Moves::None`] and [`Moves::Press`] follow the source and divide no element. Every crossing marks the
+//! nearer node of its edge, and faces whose three nodes are marked form the cut surface ([`select`]). Their nodes stay
+//! where they are, or are moved even where that presses elements flat. [`SnapSettings`] leaves out step 4.
 //!
-//! Two baselines share the last steps: [`subdivide`] divides elements where the sweep parts them, in place of 1, 2 and 4;
-//! [`remove`] takes elements out.
+//! Two baselines share the last steps: [`subdivide`] divides elements everywhere instead of moving nodes; [`remove`]
+//! takes elements out.
 //!
 //! [`Snapper`] runs them. Per incision it remembers what a sweep has crossed but not cut yet. It searches where
 //! a cut inside the elements does too, and copies only what it changes of the mesh.
@@ -24,10 +26,10 @@
 //! with lengths, so the same cut in millimetres and in metres gives the same mesh.
 //!
 //! # Source
-//! Nienhuys 2003, *Cutting in deformable objects*, §3.2. Four things differ here. Faces are selected only
-//! between elements on different sides of the sweep, so the cut surface does not branch. Nodes on a curved
-//! skin move so that the volume stays. A node whose move would nearly invert an element stays where it is.
-//! Elements that cannot be collapsed are kept instead of removed.
+//! Nienhuys 2003, *Cutting in deformable objects*, §3.2. Differences: elements are divided where no node can move well, as
+//! in Steinemann, Harders, Gross, Székely 2006, *Hybrid cutting of deformable solids*. [`select`] only takes faces between
+//! elements on different sides of the sweep, so the cut surface does not branch. Nodes on a curved skin move so that the
+//! volume stays. Elements that cannot be collapsed are kept instead of removed.
 
 pub mod node;
 mod paged;

@@ -12,20 +12,20 @@
 //! # Source
 //! Nienhuys 2003, §3.2.2.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::complex::{Complex, barycentric, det, face_key};
+use super::memory::{EdgeKey, Memory};
 use super::node::SnapNode;
 use super::select::NodeMark;
 use super::shape::aspect;
 
-/// A move is refused if it leaves less than this fraction of the volume of any element, in either
-/// configuration.
+/// A sound move leaves at least this fraction of the volume of every element, in either configuration.
 pub const LEAST_REMAINDER: f64 = 0.05;
 
-/// A move is refused if it makes an element flatter than this (least height over longest edge).
+/// No move makes an element flatter than this (least height over longest edge).
 pub const LEAST_ASPECT: f64 = 1e-3;
 
 /// Cosine of the angle between two skin faces beyond which the edge between them is a crease: 45°.
@@ -47,25 +47,37 @@ const OUTSIDE_ON_SKIN: f64 = 0.1;
 pub enum Moves {
     /// No node moves. The cut follows the faces where they are and is jagged (Nienhuys 2003, fig. 3.5).
     None,
-    /// Nodes whose elements all stay well shaped; the others stay where they are, off the sweep.
+    /// Nodes whose elements all stay well shaped. Where neither end of a crossed edge can move, the edge is divided.
     #[default]
     Sound,
-    /// These, and then the others as far as no element is inverted. What lies between nodes of the cut surface is pressed
-    /// flat, as in the source, and is for [`clean`](super::clean) to remove.
+    /// As many as can without inverting an element. What lies between nodes of the cut surface is pressed flat, as in the
+    /// source, and is for [`clean`](super::clean) to remove.
     Press,
 }
+
+/// Bounds of sound moves, from strict to lax. A move that satisfies a strict one is made first, and leaves more room for
+/// others.
+pub const SOUND: [Bound; 3] = [Bound::sound(0.1), Bound::sound(0.05), Bound::sound(0.03)];
 
 /// Parts of its way that a node stays short of the sweep when it presses an element flat. The first one that keeps
 /// [`LEAST_ASPECT`] is taken.
 const SHORT: [f64; 9] = [0.0, 1.0 / 256.0, 1.0 / 128.0, 1.0 / 64.0, 1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5];
 
-/// What a move must leave of the elements around.
+/// What a move must leave of every element around, in both configurations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Bound {
-    /// [`LEAST_REMAINDER`] and [`LEAST_ASPECT`].
-    Sound,
-    /// [`LEAST_ASPECT`] in both configurations.
-    Upright,
+pub struct Bound {
+    /// Least aspect ratio (least height over longest edge), except for elements that do not become flatter.
+    aspect: f64,
+    /// Least volume over that before the move.
+    remainder: f64,
+}
+
+impl Bound {
+    const UPRIGHT: Self = Self { aspect: LEAST_ASPECT, remainder: 0.0 };
+
+    const fn sound(aspect: f64) -> Self {
+        Self { aspect, remainder: LEAST_REMAINDER }
+    }
 }
 
 /// Directions in which a node may move in the reference configuration.
@@ -79,27 +91,64 @@ enum Freedom {
     None,
 }
 
-/// Moves as many nodes onto the sweep as possible, the closest first. A move may make another one possible,
-/// so passes go on until none succeeds. Returns the number of nodes that stay off the sweep.
-pub fn relocate_all(
-    complex: &mut Complex,
-    nodes: Vec<u32>,
-    marks: &BTreeMap<u32, NodeMark>,
-    moves: Moves,
-) -> usize {
+/// Moves as many nodes onto the sweep as possible, the closest first, and presses elements flat where it has to. A move
+/// may make another one possible, so passes go on until none succeeds. Returns the number of nodes that stay off the
+/// sweep.
+pub fn relocate_all(complex: &mut Complex, nodes: Vec<u32>, marks: &BTreeMap<u32, NodeMark>) -> usize {
     let mut waiting = nodes;
-    waiting.sort_by(|p, q| marks[p].distance.total_cmp(&marks[q].distance).then(p.cmp(q)));
+    sort_by_distance(&mut waiting, marks);
     loop {
         let before = waiting.len();
-        waiting.retain(|n| !relocate(complex, *n, &marks[n], (&[0.0], Bound::Sound)));
+        waiting.retain(|n| !relocate(complex, *n, &marks[n], (&[0.0], Bound::sound(LEAST_ASPECT))));
         if waiting.is_empty() || waiting.len() == before {
             break;
         }
     }
-    if moves == Moves::Press {
-        waiting.retain(|n| !relocate(complex, *n, &marks[n], (&SHORT, Bound::Upright)));
-    }
+    waiting.retain(|n| !relocate(complex, *n, &marks[n], (&SHORT, Bound::UPRIGHT)));
     waiting.len()
+}
+
+fn sort_by_distance(nodes: &mut [u32], marks: &BTreeMap<u32, NodeMark>) {
+    nodes.sort_by(|p, q| marks[p].distance.total_cmp(&marks[q].distance).then(p.cmp(q)));
+}
+
+/// Moves nodes onto the sweep, the closest first, until each of the crossed `edges` has one end there or none that may
+/// move. Returns the nodes that moved, and the unit normals of the sweep there.
+pub fn relocate_ends(
+    complex: &mut Complex,
+    edges: &BTreeSet<EdgeKey>,
+    memory: &Memory,
+    bound: Bound,
+) -> BTreeMap<u32, Vector3<f64>> {
+    let mut marks: BTreeMap<u32, NodeMark> = BTreeMap::new();
+    let mut others: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for edge in edges {
+        let Some(crossing) = memory.crossings.get(edge) else { continue };
+        let (point, normal) = (crossing.point(edge, complex), crossing.normal);
+        for (n, other) in [(edge[0], edge[1]), (edge[1], edge[0])] {
+            others.entry(n).or_default().push(other);
+            let distance = (point - complex.x_of(n)).norm();
+            if marks.get(&n).is_none_or(|mark| distance < mark.distance) {
+                marks.insert(n, NodeMark { point, normal, distance });
+            }
+        }
+    }
+    let mut waiting: Vec<u32> = marks.keys().copied().collect();
+    sort_by_distance(&mut waiting, &marks);
+    let mut moved = BTreeMap::new();
+    loop {
+        let before = waiting.len();
+        waiting.retain(|n| {
+            let is_needed = others[n].iter().any(|other| !moved.contains_key(other));
+            if is_needed && relocate(complex, *n, &marks[n], (&[0.0], bound)) {
+                moved.insert(*n, marks[n].normal);
+            }
+            is_needed && !moved.contains_key(n)
+        });
+        if waiting.len() == before {
+            return moved;
+        }
+    }
 }
 
 /// Moves node `n` onto the sweep near `mark`, or as far as the first of the parts of its way allows that it may stay
@@ -231,16 +280,11 @@ fn keeps(complex: &Complex, n: u32, moved: &SnapNode, bound: Bound) -> bool {
         };
         let (rest, now) = (complex.rest(t), complex.now(t));
         let (new_rest, new_now) = (put(rest, moved.rest), put(now, moved.x));
-        let flat = |new: &[Vector3<f64>; 4], old: &[Vector3<f64>; 4]| {
-            aspect(new) < LEAST_ASPECT && aspect(new) < aspect(old)
+        let is_good = |new: &[Vector3<f64>; 4], old: &[Vector3<f64>; 4]| {
+            det(new) > bound.remainder * det(old)
+                && (aspect(new) >= bound.aspect || aspect(new) >= aspect(old))
         };
         let is_inverted = det(&now) <= 0.0;
-        match bound {
-            Bound::Sound => {
-                let sound_now = is_inverted || det(&new_now) > LEAST_REMAINDER * det(&now);
-                sound_now && !flat(&new_rest, &rest) && det(&new_rest) > LEAST_REMAINDER * det(&rest)
-            }
-            Bound::Upright => (is_inverted || !flat(&new_now, &now)) && !flat(&new_rest, &rest),
-        }
+        is_good(&new_rest, &rest) && (is_inverted || is_good(&new_now, &now))
     })
 }

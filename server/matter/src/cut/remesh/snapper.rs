@@ -9,10 +9,10 @@ use super::complex::{Before, Complex, FaceKey};
 use super::dissect::{Duplicate, dissect};
 use super::memory::Memory;
 use super::node::{NEW, Nodes, SnapNode};
-use super::relocate::{Moves, relocate_all};
+use super::relocate::{Moves, SOUND, relocate_all, relocate_ends};
 use super::remove::remove;
 use super::select::{Selection, cross, select};
-use super::subdivide::subdivide;
+use super::subdivide::{INSIDE, edges_of_parted, settle_ends, subdivide};
 use crate::cut::{BladeSweep, CutError, CutMesh, ElementsAround, Front, sweep_bounds, sweep_triangles};
 use crate::mesh::TetMesh;
 
@@ -43,6 +43,10 @@ impl Default for SnapSettings {
         Self { moves: Moves::default(), clean: true }
     }
 }
+
+/// A node that may not move counts as lying on a sweep that crosses one of its edges closer to it than this part of the
+/// edge. Dividing the edge there would make flat elements.
+const CLOSE: f64 = 0.05;
 
 /// Counts of what one cut did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -152,16 +156,23 @@ impl Snapper {
         // Nodes may move before the faces open, so last blade positions are looked up first.
         let fronts = self.last_blades(&complex, blade, incision);
         let n_elements = mesh.mesh().tets.len();
-        let memory = self.memories.entry(incision).or_default();
-        cross(&complex, &near, &triangles, memory);
-        let opened = match self.how {
-            MeshCut::Snap => snap(&mut complex, memory, self.settings.moves),
-            MeshCut::Subdivide => divide(&mut complex, memory),
-            MeshCut::Remove => take_out(&mut complex, memory, (incision, n_elements)),
+        let mut memory = self.memories.remove(&incision).unwrap_or_default();
+        cross(&complex, &near, &triangles, &mut memory);
+        let opened = match (self.how, self.settings.moves) {
+            (MeshCut::Snap, Moves::Sound) => smooth(&mut complex, &mut memory),
+            (MeshCut::Snap, moves) => snap(&mut complex, &mut memory, moves),
+            (MeshCut::Subdivide, _) => {
+                let edges = edges_of_parted(&complex, &memory);
+                settle_ends(&mut memory, &edges, INSIDE);
+                divide(&mut complex, &mut memory)
+            }
+            (MeshCut::Remove, _) => take_out(&mut complex, &mut memory, (incision, n_elements)),
         };
+        let pending = memory.crossings.len();
+        self.memories.insert(incision, memory);
         let Some(opened) = opened else {
             self.tags = complex.into_tags();
-            let report = SnapReport { pending: memory.crossings.len(), examined, ..SnapReport::default() };
+            let report = SnapReport { pending, examined, ..SnapReport::default() };
             if let Some(last) = blade.segments.last() {
                 self.fronts.insert(incision, mesh.front_among_candidates(last, nodes.x));
             }
@@ -272,6 +283,7 @@ impl Snapper {
 }
 
 /// What a cut is about to open.
+#[derive(Default)]
 struct Opened {
     report: SnapReport,
     /// Faces that open; none where elements were taken out.
@@ -292,11 +304,32 @@ fn snap(complex: &mut Complex, memory: &mut Memory, moves: Moves) -> Option<Open
     let wanted: Vec<u32> = nodes.iter().copied().filter(|n| marks.contains_key(n)).collect();
     if moves != Moves::None {
         report.moved = wanted.len();
-        report.refused = relocate_all(complex, wanted, &marks, moves);
+        report.refused = relocate_all(complex, wanted, &marks);
         report.moved -= report.refused;
     }
     memory.settle(nodes.iter().filter_map(|n| Some((*n, marks.get(n)?.normal))));
     Some(Opened { report, faces, nodes })
+}
+
+/// Moves nodes as far as elements stay sound, and divides the edges both ends of which would have to stay; `None` if
+/// nothing can be cut.
+fn smooth(complex: &mut Complex, memory: &mut Memory) -> Option<Opened> {
+    let edges = edges_of_parted(complex, memory);
+    let mut moved = 0;
+    for bound in SOUND {
+        let now = relocate_ends(complex, &edges, memory, bound);
+        moved += now.len();
+        memory.settle(now.into_iter());
+    }
+    let off = settle_ends(memory, &edges, CLOSE);
+    let opened = divide(complex, memory);
+    if moved == 0 && opened.is_none() {
+        return None;
+    }
+    let mut opened = opened.unwrap_or_default();
+    opened.report.moved = moved;
+    opened.report.refused += off;
+    Some(opened)
 }
 
 /// Divides the elements that the incision has parted; `None` if there are none.

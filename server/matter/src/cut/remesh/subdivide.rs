@@ -21,7 +21,10 @@ use crate::mesh::{DEGENERATE_VOLUME, TET_EDGES};
 
 /// Least distance of a new node from the ends of its edge, relative to the edge. Without it a node that lies on the sweep
 /// but for rounding could be parted from both of its sides.
-const INSIDE: f64 = 1e-3;
+pub const INSIDE: f64 = 1e-3;
+
+/// Distance from the sweep, relative to an edge, up to which a node lies on the sweep but for rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// A new element has at least so many times the volume below which a mesh is refused.
 const ROOM: f64 = 100.0;
@@ -37,13 +40,20 @@ pub struct Divided {
     pub refused: usize,
 }
 
+/// Lets a node count as lying on the sweep where this crosses one of the `edges` closer to the node than a `part` of the
+/// edge. Returns the number of such nodes that lie beside the sweep, not counting those that rounding puts there.
+pub fn settle_ends(memory: &mut Memory, edges: &BTreeSet<EdgeKey>, part: f64) -> usize {
+    let crossed = edges.iter().filter_map(|edge| Some((edge, memory.crossings.get(edge)?)));
+    let ends = crossed.map(|(edge, c)| (c.near(edge), c.normal, c.t.min(1.0 - c.t)));
+    let ends: Vec<_> = ends.filter(|end| end.2 < part).collect();
+    let beside: BTreeSet<u32> = ends.iter().filter(|end| end.2 > ROUNDING).map(|end| end.0).collect();
+    memory.settle(ends.into_iter().map(|(n, normal, _)| (n, normal)));
+    beside.len()
+}
+
 /// Divides all elements that the incision of `memory` has parted.
 pub fn subdivide(complex: &mut Complex, memory: &mut Memory) -> Divided {
     let mut divided = Divided::default();
-    let is_at_end = |t: f64| !(INSIDE..=1.0 - INSIDE).contains(&t);
-    let ends = memory.crossings.iter().filter(|(_, crossing)| is_at_end(crossing.t));
-    let ends: Vec<_> = ends.map(|(edge, crossing)| (crossing.near(edge), crossing.normal)).collect();
-    memory.settle(ends.into_iter());
     for edge in edges_of_parted(complex, memory) {
         let Some(crossing) = memory.crossings.get(&edge).copied() else { continue };
         let t = crossing.t;
@@ -63,7 +73,7 @@ pub fn subdivide(complex: &mut Complex, memory: &mut Memory) -> Divided {
 }
 
 /// Crossed edges of the elements whose nodes beside the sweep hang together only over crossed edges, ascending.
-fn edges_of_parted(complex: &Complex, memory: &Memory) -> BTreeSet<EdgeKey> {
+pub fn edges_of_parted(complex: &Complex, memory: &Memory) -> BTreeSet<EdgeKey> {
     let crossed = memory.crossings.keys().flat_map(|edge| complex.around_edge(edge[0], edge[1]));
     let touched: BTreeSet<u32> = crossed.collect();
     let mut edges = BTreeSet::new();

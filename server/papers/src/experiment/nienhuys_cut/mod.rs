@@ -41,8 +41,8 @@ pub(super) fn cuts(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, 
         about: "A cube of 729 nodes and 3,072 elements with ν = ¼ is held at its back face and pulled apart at its sides, cut \
             from end to end by one oblique plane, and relaxed by conjugate gradients until ‖r‖ < 1e-3 ‖f‖, from where it was \
             before the cut; and a cylinder of 891 nodes is cut three times along its axis. Each is cut in four ways: no node \
-            moves; nodes move where all elements stay sound, which is what a scene gets without further keys; nodes also press \
-            elements flat; and these are removed by splits and collapses. An element is degenerate if its least height is \
+            moves; nodes move where all elements stay sound and elements are divided elsewhere, which is what a scene gets without \
+            further keys; nodes move everywhere and press elements flat; and these are removed by splits and collapses. An element is degenerate if its least height is \
             below 0.01 of its longest edge, and an angle is large beyond 0.99 π, as printed."
             .into(),
         ..ExperimentResult::default()
@@ -82,8 +82,8 @@ fn diagonal(
          removed. Left: after that. Preconditioned: iterations with 3×3 \
          diagonal blocks, to the same ‖r‖. Off: the largest distance of a node of the lips from the plane, in edges of a cell, without held nodes, which \
          no cut moves. \
-         Cleaning: what the cut takes longer with it, of the fastest of five runs. Where nodes move only as far as elements \
-         stay sound, none is degenerate and nothing is left to clean, but nodes stay off the plane. Pressing stops at 0.001 \
+         Cleaning: what the cut takes longer with it, of the fastest of five runs. Sound moves leave no degenerate element and \
+         nothing to clean. Their splits divide edges neither end of which may move. Pressing stops at 0.001 \
          of the longest edge and never inverts an element, while the thesis presses to rounding and inverts some; so \
          elements that it left degenerate cost it more iterations. It also took 13 elements out; here none is.",
         &[
@@ -219,7 +219,7 @@ fn cylinder(
          through the axis at rest. Elements and nodes are those of the uncut cylinder. The thesis prints neither its shape \
          nor its points; besides 873 faces, which 5 % of collapses refer to, it prints 45 faces for the same cuts. Nodes that \
          are not moved lie on the edges of lips that an earlier cut made, on rims, or on the round skin, where a move must \
-         keep the volume; there elements also stay degenerate.",
+         keep the volume; there elements also stay degenerate, or are divided where only sound moves are made.",
         &[
             ("elements", Unit::Count),
             ("nodes", Unit::Count),

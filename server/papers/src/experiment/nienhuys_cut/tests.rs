@@ -1,8 +1,11 @@
 //! Counts and iterations of the cuts. Times are never tested.
 
+use scindo_physics::cut::remesh::SnapSettings;
+
 use super::*;
 
-/// Pressing brings the lips to the plane and costs iterations; cleaning gives most of them back.
+/// Sound moves bring the lips to the plane without degenerate elements. So does pressing, which costs iterations; cleaning
+/// gives most of them back.
 #[test]
 fn cleaning_a_pressed_cube_saves_iterations() {
     let plane = plane();
@@ -15,7 +18,7 @@ fn cleaning_a_pressed_cube_saves_iterations() {
         (made.report, cells, flat, iterations)
     });
     assert!(jagged.1 > 0.3 && jagged.0.moved == 0);
-    assert!(sound.1 > 0.1 && sound.2 == 0 && sound.0.refused > 10);
+    assert!(sound.1 < 0.1 && sound.2 == 0, "{sound:?}");
     assert!(pressed.1 < 0.25 && pressed.2 > 30 && pressed.0.collapses == 0);
     assert!(cleaned.1 < 0.25 && cleaned.2 == 0 && cleaned.0.collapses > 30);
     assert!(pressed.3[0] > 2 * cleaned.3[0], "{:?} {:?}", pressed.3, cleaned.3);
@@ -31,6 +34,8 @@ fn pie_cuts_make_six_slices() {
         let made = make(whole, &cylinder.blades(0.0)).unwrap();
         assert_eq!(made.body.parts().len(), 2 * pie::CUTS, "{}", way.name);
         assert!((made.body.masses().iter().sum::<f64>() / mass - 1.0).abs() < 1e-9);
+        let off = made.off_m(&cylinder.planes(0.0)) / delaunay::SPACING_M;
+        assert!(off < 0.1 || way.snap != SnapSettings::default(), "{off} {:?}", made.report);
     }
 }
 

@@ -26,11 +26,10 @@ fn a_plane_parts_the_body_in_two_on_the_plane() {
             sample.check();
             assert_eq!(sample.parts(), 2, "{pattern:?} {point:?} {normal:?}: {report:?}");
             let n = normal.normalize();
-            let lips = sample.lip_nodes();
-            let on = lips.iter().filter(|&&m| (sample.nodes[m as usize].rest - point).dot(&n).abs() < 1e-9);
-            let (on, all) = (on.count(), lips.len());
-            assert!(2 * on >= all, "{pattern:?} {normal:?}: {on} of {all} on the plane, {report:?}");
-            assert!(sample.mesh.tets.len() <= elements, "{report:?}");
+            let off = |m: u32| (sample.nodes[m as usize].rest - point).dot(&n).abs();
+            let farthest = sample.lip_nodes().into_iter().map(off).fold(0.0, f64::max);
+            assert!(farthest < 1e-9, "{pattern:?} {normal:?}: {farthest:e}, {report:?}");
+            assert!(10 * sample.mesh.tets.len() <= 12 * elements, "{report:?}");
             let volumes = sample.cut_mesh().components().volume;
             let below = volumes.iter().fold(1.0, |a: f64, b| a.min(*b));
             assert!(below > 0.3, "{volumes:?}");
@@ -38,8 +37,7 @@ fn a_plane_parts_the_body_in_two_on_the_plane() {
     }
 }
 
-/// A plane that halves every edge it crosses. All edges choose the node on the same side, which leaves these
-/// nodes space to move.
+/// A plane that halves every edge it crosses. Nodes on both sides are as far from it.
 #[test]
 fn a_plane_that_halves_every_edge_has_nearly_all_lip_nodes_on_it() {
     for pattern in [BoxPattern::Tet6, BoxPattern::Tet5 { parity: false }, BoxPattern::Octahedral6] {
@@ -140,5 +138,7 @@ fn held_nodes_stay_and_loads_keep_their_sum() {
     let after: Vector3<f64> = sample.nodes.iter().map(|n| n.point_force).sum();
     assert!((after - before).norm() < 1e-9 * before.norm());
     let now: Vec<_> = sample.nodes.iter().filter(|n| n.fixed.is_some()).map(|n| n.rest).collect();
-    assert!(now.len() > held.len() && now.iter().all(|x| held.contains(x)));
+    assert!(now.len() > held.len() && held.iter().all(|x| now.contains(x)));
+    // An edge between held nodes cannot lose either, so it is divided, and its new node is held.
+    assert!(now.iter().all(|x| x.z == 0.0) && now.iter().any(|x| !held.contains(x)));
 }

@@ -6,6 +6,7 @@ mod degenerate;
 mod local;
 mod random;
 mod settings;
+mod smooth;
 
 use fastrand::Rng;
 use nalgebra::{Matrix3, Vector3};
