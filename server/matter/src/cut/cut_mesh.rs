@@ -13,6 +13,7 @@ use super::shell::surface::Surface;
 use super::shell::surface_builder::{Change, Material, SurfaceBuilder};
 use super::sweep::bit_marks::Ascending;
 use super::sweep::blade::{BladeSweep, CutError, CutLimits, CutReport, Work};
+use super::sweep::borders::{Borders, Joined, Reach, edges};
 use super::sweep::detect::{Deformed, Detector, Place, Record};
 use super::sweep::front::{Front, Surroundings, sweep_triangles};
 use super::sweep::front_elements::{FrontElements, Meeting};
@@ -36,6 +37,7 @@ const SEPARATION: usize = 20;
 pub struct SweepUnderWay {
     triangles: Vec<SweepTriangle>,
     incision: u32,
+    joined: Joined,
     place: Place,
     most_fragments: usize,
 }
@@ -65,6 +67,7 @@ pub struct CutMesh {
     pub(super) crossings: Crossings,
     pending: Pending,
     fronts: BTreeMap<u32, Front>,
+    borders: Borders,
     traces: Traces,
     detector: Detector,
     separator: Separator,
@@ -127,6 +130,7 @@ impl CutMesh {
             crossings: Crossings::with_capacity(n_nodes),
             pending: Pending::default(),
             fronts: BTreeMap::new(),
+            borders: Borders::default(),
             traces: Traces::default(),
             detector: Detector::with_capacity(n_nodes, n_elements),
             separator: Separator::with_capacity(n_elements),
@@ -205,9 +209,19 @@ impl CutMesh {
 
     /// The same if the last search for pieces was at these positions, in a box that holds the segment.
     pub(crate) fn front_among_candidates(&self, segment: &[Vector3<f64>; 2], x: &[Vector3<f64>]) -> Front {
-        let near = self.detector.tets_near(segment, &self.pieces);
+        let near = self.candidates_near(&[segment[0].inf(&segment[1]), segment[0].sup(&segment[1])]);
         let around = |copy| self.copies.tets_around(copy, &self.pieces);
         Front::remember(segment, &Surroundings { near: &near, around: &around, x })
+    }
+
+    /// Copies of the pieces of the last search that may meet the box between two corners [m].
+    pub(crate) fn candidates_near(&self, corners: &[Vector3<f64>; 2]) -> Vec<[u32; 4]> {
+        self.detector.tets_near(corners, &self.pieces)
+    }
+
+    /// Side [m] of the cube that six elements of mean volume fill.
+    pub fn cell_m(&self) -> f64 {
+        (6.0 * self.copy_volume().iter().sum::<f64>() / self.mesh.tets.len() as f64).cbrt()
     }
 
     /// Σ over pieces of ∫ N_a dV [m³] per copy. The mass of a copy is the density times this.
@@ -365,7 +379,12 @@ impl CutMesh {
             return Err(CutError::NonFinitePosition { copy });
         }
         // The sweep starts where the material has carried the last blade position of this incision.
-        let mut triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
+        let front = self.fronts.get(&incision);
+        let mut triangles = sweep_triangles(front, blade, x);
+        let edges = edges(front, blade, x);
+        let reach = Reach { cell_m: self.cell_m(), back_m: 0.0 };
+        let mut joined = self.borders.join(&edges, incision, x, reach);
+        triangles.append(&mut joined.triangles);
         triangles.iter_mut().for_each(|triangle| triangle.exact = !self.inexact);
         let bounds = sweep_bounds(&triangles, blade);
         let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
@@ -374,8 +393,10 @@ impl CutMesh {
             let front = self.front_among_candidates(last, x);
             self.fronts.insert(incision, front);
         }
+        let near = |corners: &[Vector3<f64>; 2]| self.detector.tets_near(corners, &self.pieces);
+        self.borders.remember(&edges, incision, &near, x);
         let place = self.detector.begin(&self.fragments);
-        Ok(SweepUnderWay { triangles, incision, place, most_fragments: limits.fragments })
+        Ok(SweepUnderWay { triangles, incision, joined, place, most_fragments: limits.fragments })
     }
 
     /// Searches for crossings of the sweep with the body at the positions `x` [m] it began with. Returns
@@ -384,14 +405,19 @@ impl CutMesh {
         let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
         let (traces, incision) = (&mut self.traces, sweep.incision);
-        let mut record = Record { fragments, sets, crossings, traces, incision };
+        let joined = &sweep.joined.parts[..];
+        let mut record = Record { fragments, sets, crossings, traces, incision, joined };
         self.detector.run(&body, &sweep.triangles, &mut record, (&mut sweep.place, work))
     }
 
     /// Separates everything that the detection found to be cut, in one call, with the positions `x` [m] the sweep began
     /// with.
     pub fn complete(&mut self, x: &[Vector3<f64>], sweep: SweepUnderWay, work: &mut Work) -> CutReport {
-        let SweepUnderWay { triangles, incision, most_fragments, .. } = sweep;
+        let SweepUnderWay { triangles, incision, joined, most_fragments, .. } = sweep;
+        // What the sweep has taken over is pending in its name alone.
+        for &t in &self.detector.touched {
+            joined.parts.iter().for_each(|&other| self.pending.set(other, t, false));
+        }
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
         let (waiting, traces) = (&mut self.pending, &mut self.traces);
         let mut sheet = Sheet { fragments, sets, crossings, waiting, traces, incision, most_fragments };
@@ -400,11 +426,15 @@ impl CutMesh {
         let (ahead, reach) = (&mut self.front_elements, self.front_reach);
         let front = (reach > 0.0).then_some((ahead, reach, meeting));
         self.separator.run((&self.detector.touched, &self.detector.near), front, &mut sheet);
-        let report = self.follow_separation();
+        let mut report = self.follow_separation();
         if !self.traces.is_empty() {
             let opened = self.builder.faces_beside_lips(&self.surface, incision);
-            opened.for_each(|face| self.traces.open(face, incision, &self.fragments));
+            for face in opened {
+                let incisions = joined.parts.iter().chain([&incision]);
+                incisions.for_each(|&incision| self.traces.open(face, incision, &self.fragments));
+            }
         }
+        report.joined = joined.incisions;
         work.book(SEPARATION * (self.detector.touched.len() + self.separator.changed.len()));
         report
     }

@@ -127,6 +127,7 @@ impl Body {
             elements_cut: report.elements,
             faces_opened: report.faces,
             pending_edges: report.pending,
+            joined: snap.snapper.joined().to_vec(),
             epoch: self.space.epoch(),
             ..CutReport::default()
         };

@@ -229,9 +229,8 @@ impl Space for Tets {
     }
 
     fn element_size(&self) -> f64 {
-        let per_cell = if self.kind() == ElementKind::Hex8 { 1.0 } else { 6.0 };
-        let volume: f64 = self.cut.copy_volume().iter().sum();
-        (per_cell * volume / self.n_elements() as f64).cbrt()
+        // The mesh that is cut has six tetrahedra for every hexahedron.
+        self.cut.cell_m()
     }
 
     fn n_elements(&self) -> usize {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::complex::Complex;
+use crate::mesh::TET_EDGES;
 
 /// Nodes of an edge in ascending order.
 pub type EdgeKey = [u32; 2];
@@ -70,6 +71,18 @@ impl Memory {
             }
         }
         self.crossings.extend(more);
+    }
+
+    /// Takes over what another part of the same cut has crossed of an element with these nodes.
+    pub fn take_over(&mut self, other: &Self, tet: [u32; 4]) {
+        let on = tet.into_iter().filter_map(|n| Some((n, *other.on.get(&n)?)));
+        on.for_each(|(n, normal)| _ = self.on.entry(n).or_insert(normal));
+        for [i, j] in TET_EDGES {
+            let edge = [tet[i].min(tet[j]), tet[i].max(tet[j])];
+            if let Some(crossing) = other.crossings.get(&edge) {
+                self.crossings.entry(edge).or_insert(*crossing);
+            }
+        }
     }
 
     /// Removes the crossings that a new cut surface has settled: those of edges at its nodes.

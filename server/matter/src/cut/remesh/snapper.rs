@@ -13,7 +13,10 @@ use super::relocate::{Moves, SOUND, relocate_all, relocate_ends};
 use super::remove::remove;
 use super::select::{Selection, cross, select};
 use super::subdivide::{INSIDE, edges_of_parted, settle_ends, subdivide};
-use crate::cut::{BladeSweep, CutError, CutMesh, ElementsAround, Front, sweep_bounds, sweep_triangles};
+use crate::cut::{
+    BladeSweep, Borders, CutError, CutMesh, ElementsAround, Front, Reach, border_edges, bounds, sweep_bounds,
+    sweep_triangles,
+};
 use crate::mesh::TetMesh;
 
 /// How the mesh is changed.
@@ -88,6 +91,8 @@ pub struct SnapCut {
     pub duplicates: Vec<Duplicate>,
     /// Last blade position [m] of every incision, for [`Snapper::follow`].
     pub fronts: Vec<(u32, [Vector3<f64>; 2])>,
+    /// Where the points of the borders of all sweeps are [m], for [`Snapper::follow`].
+    pub borders: Vec<Vec<Vector3<f64>>>,
 }
 
 /// Cuts the mesh of one body, and remembers unfinished incisions.
@@ -97,6 +102,8 @@ pub struct Snapper {
     settings: SnapSettings,
     memories: BTreeMap<u32, Memory>,
     fronts: BTreeMap<u32, Front>,
+    borders: Borders,
+    joined: Vec<u32>,
     tags: BTreeMap<FaceKey, u32>,
 }
 
@@ -123,6 +130,11 @@ impl Snapper {
         &self.tags
     }
 
+    /// Earlier incisions that the last sweep goes on with, ascending.
+    pub fn joined(&self) -> &[u32] {
+        &self.joined
+    }
+
     /// This snapper before its first cut.
     pub fn afresh(&self) -> Self {
         Self::new(self.how, self.settings)
@@ -147,17 +159,26 @@ impl Snapper {
         if let Some(copy) = nodes.x.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
             return Err(CutError::NonFinitePosition { copy });
         }
-        let triangles = sweep_triangles(self.fronts.get(&incision), blade, nodes.x);
+        let front = self.fronts.get(&incision);
+        let mut triangles = sweep_triangles(front, blade, nodes.x);
+        let edges = border_edges(front, blade, nodes.x);
+        let reach = Reach { cell_m: mesh.cell_m(), back_m: 0.0 };
+        let mut joined = self.borders.join(&edges, incision, nodes.x, reach);
+        triangles.append(&mut joined.triangles);
+        self.joined = joined.incisions;
         let (near, examined) = mesh.pieces_near(nodes.x, &sweep_bounds(&triangles, blade));
         // Nothing is cut inside the elements of this mesh, so its pieces are its elements.
         let near = near.to_vec();
+        self.borders.remember(&edges, incision, &|corners| mesh.candidates_near(corners), nodes.x);
         let before = Before { tets: &mesh.mesh().tets, around: mesh.elements_around(), nodes };
         let mut complex = Complex::new(before, std::mem::take(&mut self.tags));
         // Nodes may move before the faces open, so last blade positions are looked up first.
         let fronts = self.last_blades(&complex, blade, incision);
         let n_elements = mesh.mesh().tets.len();
         let mut memory = self.memories.remove(&incision).unwrap_or_default();
-        cross(&complex, &near, &triangles, &mut memory);
+        let earlier: Vec<&Memory> =
+            joined.parts.iter().filter_map(|other| self.memories.get(other)).collect();
+        cross(&complex, &near, &triangles, &earlier, &mut memory);
         let opened = match (self.how, self.settings.moves) {
             (MeshCut::Snap, Moves::Sound) => smooth(&mut complex, &mut memory),
             (MeshCut::Snap, moves) => snap(&mut complex, &mut memory, moves),
@@ -168,6 +189,13 @@ impl Snapper {
             }
             (MeshCut::Remove, _) => take_out(&mut complex, &mut memory, (incision, n_elements)),
         };
+        // What the sweep has opened, it has opened for those that it joins too.
+        for nodes in opened.iter().map(|opened| &opened.nodes) {
+            let on = || nodes.iter().filter_map(|n| Some((*n, *memory.on.get(n)?)));
+            for other in &joined.parts {
+                self.memories.entry(*other).or_default().settle(on());
+            }
+        }
         let pending = memory.crossings.len();
         self.memories.insert(incision, memory);
         let Some(opened) = opened else {
@@ -178,14 +206,17 @@ impl Snapper {
             }
             return Ok((report, None));
         };
+        let borders = self.borders.places(nodes.x);
         let (report, cut) = self.open(complex, opened, incision);
-        Ok((SnapReport { examined, ..report }, Some(SnapCut { fronts, ..cut })))
+        Ok((SnapReport { examined, ..report }, Some(SnapCut { fronts, borders, ..cut })))
     }
 
     /// Remembers the last blade positions by the material of the mesh after a cut, at the positions `x` [m] of
     /// its nodes.
     pub fn follow(&mut self, mesh: &mut CutMesh, x: &[Vector3<f64>], cut: &SnapCut) {
         self.fronts = cut.fronts.iter().map(|(incision, ends)| (*incision, mesh.front(ends, x))).collect();
+        mesh.pieces_near(x, &bounds(cut.borders.iter().flatten()));
+        self.borders.bind_again(&cut.borders, &|corners| mesh.candidates_near(corners), x);
     }
 
     /// Opens the selected faces, and removes degenerate elements where nodes were moved.
@@ -385,7 +416,7 @@ fn compact(complex: &Complex, number: &[Option<u32>], duplicates: &[Duplicate]) 
     let there = duplicates.iter().map(|d| Duplicate { node: of(d.node), parent: of(d.parent) });
     let duplicates = there.filter(|d| d.node != NEW && d.parent != NEW).collect();
     let mesh = TetMesh { nodes: nodes.iter().map(|n| n.rest).collect(), tets };
-    SnapCut { mesh, nodes, duplicates, fronts: Vec::new() }
+    SnapCut { mesh, nodes, duplicates, fronts: Vec::new(), borders: Vec::new() }
 }
 
 fn tags_of(complex: &Complex, number: &[Option<u32>]) -> BTreeMap<FaceKey, u32> {

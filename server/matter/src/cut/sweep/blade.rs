@@ -69,6 +69,8 @@ pub struct CutReport {
     pub pending_edges: usize,
     /// Edges left whole because an element or the body reached its cap of fragments.
     pub refused_edges: usize,
+    /// Earlier incisions that this sweep goes on with, ascending.
+    pub joined: Vec<u32>,
     /// Topology epoch after the sweep.
     pub epoch: u32,
 }

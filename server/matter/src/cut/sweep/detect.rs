@@ -94,6 +94,8 @@ pub(crate) struct Record<'a> {
     pub traces: &'a mut Traces,
     /// Incision of the sweep.
     pub incision: u32,
+    /// Earlier incisions that are parts of the same cut.
+    pub joined: &'a [u32],
 }
 
 impl Record<'_> {
@@ -111,6 +113,46 @@ impl Record<'_> {
                 f.tag[beside as usize][slot] == self.incision
             }
         })
+    }
+
+    /// Whether another incision has entered fragment `t` without cutting it apart.
+    fn is_unfinished(&self, other: u32, t: u32) -> bool {
+        let f = &*self.fragments;
+        let tet = f.tets[t as usize];
+        let along = |face: usize| {
+            f.neighbour[t as usize][face] != NONE && self.sets.contains(f.along[t as usize][face], other)
+        };
+        (0..4).any(along)
+            || TET_EDGES.iter().any(|&[i, j]| self.crossings.get(tet[i], tet[j], other).is_some())
+    }
+
+    /// Takes over what other parts of the cut have crossed in fragment `t` and not cut apart.
+    fn take_over(&mut self, t: u32) {
+        let Self { joined, incision, .. } = *self;
+        for &other in joined {
+            if !self.is_unfinished(other, t) {
+                continue;
+            }
+            let tet = self.fragments.tets[t as usize];
+            for v in tet {
+                let on = &mut self.fragments.on[v as usize];
+                if self.sets.contains(*on, other) {
+                    *on = self.sets.with(*on, incision);
+                }
+            }
+            for [a, b] in TET_EDGES.map(|[i, j]| [tet[i], tet[j]]) {
+                if let Some(s) = self.crossings.get(a, b, other) {
+                    self.crossings.insert(a, b, incision, s);
+                }
+            }
+            for face in 0..4 {
+                let along = &mut self.fragments.along[t as usize][face];
+                if self.sets.contains(*along, other) {
+                    *along = self.sets.with(*along, incision);
+                    self.mark_along(t, face);
+                }
+            }
+        }
     }
 
     fn mark_along(&mut self, t: u32, face: usize) {
@@ -143,9 +185,8 @@ impl Detector {
         resize_reserving(&mut self.side_stamp, n_vertices, 0);
     }
 
-    /// Copies of those candidate pieces whose bounding box overlaps that of the blade segment.
-    pub(crate) fn tets_near(&self, [tip, heel]: &[Vector3<f64>; 2], pieces: &PieceTable) -> Vec<[u32; 4]> {
-        let (from, to) = (tip.inf(heel), tip.sup(heel));
+    /// Copies of those candidate pieces whose bounding box overlaps the box between two corners [m].
+    pub(crate) fn tets_near(&self, [from, to]: &[Vector3<f64>; 2], pieces: &PieceTable) -> Vec<[u32; 4]> {
         let overlaps = |(_, low, high): &&(u32, Vector3<f64>, Vector3<f64>)| {
             (0..3).all(|k| from[k] <= high[k] && low[k] <= to[k])
         };
@@ -249,7 +290,7 @@ impl Detector {
             let tet = record.fragments.tets[t as usize];
             let side = tet.map(|v| self.side_of(body, triangle, p, v, record.fragments));
             if !(side.iter().all(|&s| s > 0.0) || side.iter().all(|&s| s < 0.0)) {
-                self.touch(t);
+                self.touch(t, record);
                 for [i, j] in TET_EDGES {
                     if side[i] * side[j] <= 0.0 && (side[i] != 0.0 || side[j] != 0.0) {
                         self.test_edge(triangle, t, [tet[i], tet[j]], [side[i], side[j]], record);
@@ -281,9 +322,10 @@ impl Detector {
         }
     }
 
-    fn touch(&mut self, t: u32) {
+    fn touch(&mut self, t: u32, record: &mut Record) {
         if self.marks.insert(t, TOUCHED) {
             self.touched.push(t);
+            record.take_over(t);
         }
     }
 
@@ -331,7 +373,7 @@ impl Detector {
         let mut star = Vec::new();
         record.fragments.star(t, v, &mut star);
         for t in star {
-            self.touch(t);
+            self.touch(t, record);
         }
     }
 

@@ -22,7 +22,7 @@ const MAX_POINTS: usize = 256;
 ///
 /// A blade that ends exactly on the skin, or starts exactly where the last sweep ended, must not
 /// miss an edge there by a rounding error. The same order as the snapping of crossings.
-const OVERREACH: f64 = 1e-6;
+pub(super) const OVERREACH: f64 = 1e-6;
 
 /// One remembered point.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
@@ -81,11 +81,7 @@ impl Front {
             let nearest = nearest_copies(segment, body.x);
             points.extend(in_air.iter().filter_map(|&k| air_point(segment, k, nearest[k]?, body)));
         }
-        points.sort_by(|p, q| p.s.total_cmp(&q.s));
-        // Tets next to each other leave and enter at the same point: one of the two is enough.
-        points.dedup_by(|q, p| q.s - p.s < 1e-9);
-        let stride = points.len().div_ceil(MAX_POINTS).max(1);
-        let mut points: Vec<FrontPoint> = points.into_iter().step_by(stride).collect();
+        let mut points = in_order(points);
         // Ends beyond the outermost material follow the nearest remembered point.
         if let (Some(&first), Some(&last)) = (points.first(), points.last()) {
             if first.s > 0.0 {
@@ -217,11 +213,29 @@ fn overreach(rows: &mut [Row], back_m: f64) {
     }
 }
 
+/// Sorts points along the blade, and keeps one where tets next to each other leave and enter.
+fn in_order(mut points: Vec<FrontPoint>) -> Vec<FrontPoint> {
+    points.sort_by(|p, q| p.s.total_cmp(&q.s));
+    points.dedup_by(|q, p| q.s - p.s < 1e-9);
+    let stride = points.len().div_ceil(MAX_POINTS).max(1);
+    points.into_iter().step_by(stride).collect()
+}
+
+/// The points [m] where a segment enters and leaves the tets `near`, and their material, in order along it.
+pub(super) fn line_in_tissue(
+    segment: &[Vector3<f64>; 2],
+    near: &[[u32; 4]],
+    x: &[Vector3<f64>],
+) -> Vec<(Vector3<f64>, MaterialPoint)> {
+    let passages = near.iter().filter_map(|&copies| passage(segment, copies, x));
+    in_order(passages.flatten().collect()).iter().map(|p| (p.anchor.at, p.anchor.point)).collect()
+}
+
 fn at([tip, heel]: &[Vector3<f64>; 2], s: f64) -> Vector3<f64> {
     if s == 1.0 { *heel } else { tip + (heel - tip) * s }
 }
 
-fn unit(v: Vector3<f64>) -> Vector3<f64> {
+pub(super) fn unit(v: Vector3<f64>) -> Vector3<f64> {
     v.try_normalize(0.0).unwrap_or_default()
 }
 
@@ -294,7 +308,7 @@ fn nearest_anchor(point: &Vector3<f64>, tets: &[[u32; 4]], x: &[Vector3<f64>]) -
 }
 
 /// Barycentric coordinates of a point with respect to a tet. The point may lie outside.
-fn barycentric(point: &Vector3<f64>, copies: &[u32; 4], x: &[Vector3<f64>]) -> Option<[f64; 4]> {
+pub(super) fn barycentric(point: &Vector3<f64>, copies: &[u32; 4], x: &[Vector3<f64>]) -> Option<[f64; 4]> {
     let [o, a, b, c] = copies.map(|c| x[c as usize]);
     let w = Matrix3::from_columns(&[a - o, b - o, c - o]).try_inverse()? * (point - o);
     Some([1.0 - w.sum(), w.x, w.y, w.z])

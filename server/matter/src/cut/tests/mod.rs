@@ -6,6 +6,7 @@ mod kinds;
 mod branches;
 mod growth;
 mod fronts;
+mod adjoining;
 mod parts;
 mod random;
 mod refusals;

@@ -63,7 +63,8 @@ impl OctreeSpace {
         for vertex in copies.flat_map(|(copy, &node)| [copy, node]) {
             bound[vertex as usize] = true;
         }
-        self.fronts.values().flat_map(Front::copies).for_each(|vertex| bound[vertex as usize] = true);
+        let held = self.fronts.values().flat_map(Front::copies).chain(self.borders.copies());
+        held.for_each(|vertex| bound[vertex as usize] = true);
         let families: Vec<Family> = families.iter().copied().filter(|family| self.was_one(family)).collect();
         let change =
             self.octree.coarsen(&families, &|vertex, point| bound[vertex as usize] || stays(vertex, point));
@@ -76,6 +77,7 @@ impl OctreeSpace {
         let number = |vertex: u32| change.vertex_of[vertex as usize];
         self.node_of_copy.iter_mut().for_each(|node| *node = number(*node));
         self.fronts.values_mut().for_each(|front| front.renumber(number));
+        self.borders.renumber(number);
         self.changed.clone_from(&change.cells);
         self.only_cut = false;
         self.volumes = self.octree.vertex_volumes();

@@ -18,8 +18,8 @@ use scindo_algebra::operator::cells::CellStiffness;
 use scindo_algebra::operator::{StiffModes, Stiffness};
 use scindo_algebra::solver::multigrid::Hierarchy;
 use scindo_matter::cut::{
-    BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Solid, Surface,
-    Surroundings, Work, sweep_from_behind, swept_area,
+    BladeSweep, BorderEdge, Borders, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy,
+    Reach, Solid, Surface, Surroundings, Work, border_edges, sweep_from_behind, swept_area,
 };
 use scindo_matter::element::ElementKind;
 use scindo_matter::element::{MaterialPoint, Point, Points, Simd};
@@ -48,6 +48,9 @@ const SIDE_STEP: f64 = 1e-6;
 /// straight and no line of the material, so it may pass the front where the body deforms.
 const BEHIND: f64 = 0.25;
 
+/// The links that a sweep crosses, and the earlier incisions that it joins.
+type Crossed = (Vec<(LinkKey, CutLink)>, Vec<u32>);
+
 /// An octree that is cut, with everything that a body asks of it.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct OctreeSpace {
@@ -64,11 +67,12 @@ pub struct OctreeSpace {
     /// Whether the last change was a cut, which leaves the numbers of all earlier leaves.
     only_cut: bool,
     fronts: BTreeMap<u32, Front>,
+    borders: Borders,
     pub(crate) surface: OctreeSurface,
     /// The skin of the triangles of a surface, if the body has one.
     pub(crate) own: Option<OwnSkin>,
     epoch: u32,
-    under_way: Option<(Vec<(LinkKey, CutLink)>, CutReport)>,
+    under_way: Option<Crossed>,
     /// Made by the first cut after leaves got other numbers.
     #[serde(skip)]
     runs: Option<LeafRuns>,
@@ -87,6 +91,7 @@ impl OctreeSpace {
             reweighed: Vec::new(),
             only_cut: false,
             fronts: BTreeMap::new(),
+            borders: Borders::default(),
             surface: OctreeSurface::default(),
             own: None,
             epoch: 0,
@@ -117,10 +122,11 @@ impl OctreeSpace {
         }
     }
 
-    /// Remembers the last position of the blade by the material around it. `leaves` are all near the box `swept`.
+    /// Remembers the last position of the blade, and the `edges` of its sweep, by the material around them. `leaves`
+    /// are all near the box `swept`.
     fn remember(
         &mut self,
-        blade: &BladeSweep,
+        (blade, edges): (&BladeSweep, &[BorderEdge]),
         incision: u32,
         vertices: &VertexBoxes<'_>,
         (leaves, swept): (&[u32], &[Vector3<f64>; 2]),
@@ -142,6 +148,13 @@ impl OctreeSpace {
         };
         let front = Front::remember(last, &Surroundings { near: &near, around: &around, x });
         self.fronts.insert(incision, front);
+        let mut borders = std::mem::take(&mut self.borders);
+        let tets = |corners: &[Vector3<f64>; 2]| {
+            let near = self.octree.leaves_near_of(leaves, x, corners);
+            near.into_iter().flat_map(|id| self.tets_of(id)).collect()
+        };
+        borders.remember(edges, incision, &tets, x);
+        self.borders = borders;
     }
 
     /// Six tetrahedra on the vertices of a leaf, which fill it where no corner hangs.
@@ -164,14 +177,14 @@ impl OctreeSpace {
         }
     }
 
-    /// The links that a blade crosses, after the checks of a cut.
+    /// What a blade crosses, after the checks of a cut.
     fn search(
         &mut self,
         team: &mut Team,
         x: &[Vector3<f64>],
         blade: &BladeSweep,
         incision: u32,
-    ) -> Result<Vec<(LinkKey, CutLink)>, CutError> {
+    ) -> Result<Crossed, CutError> {
         blade.check()?;
         if incision == 0 {
             return Err(CutError::ReservedIncision);
@@ -190,13 +203,17 @@ impl OctreeSpace {
         if found >= limit {
             return Err(CutError::Full { what: "cells", found, limit });
         }
-        let triangles =
-            sweep_from_behind(self.fronts.get(&incision), blade, x, BEHIND * self.octree.lattice().h);
+        let (front, cell_m) = (self.fronts.get(&incision), self.octree.lattice().h);
+        let back_m = BEHIND * cell_m;
+        let mut triangles = sweep_from_behind(front, blade, x, back_m);
+        let edges = border_edges(front, blade, x);
+        let mut joined = self.borders.join(&edges, incision, x, Reach { cell_m, back_m });
+        triangles.append(&mut joined.triangles);
         let swept = swept_box(&triangles);
         let leaves = self.leaves_near(&vertices, &swept);
         let cuts = self.octree.crossed_links_in(team, &leaves, x, (&triangles, incision));
-        self.remember(blade, incision, &vertices, (&leaves, &swept));
-        Ok(cuts)
+        self.remember((blade, &edges), incision, &vertices, (&leaves, &swept));
+        Ok((cuts, joined.incisions))
     }
 
     /// Leaves that may meet the box between two corners [m] with the vertices at `x` [m], by the runs if there are any.
@@ -229,9 +246,9 @@ impl OctreeSpace {
     }
 
     /// Cuts these links and brings everything up to date.
-    fn open(&mut self, team: &mut Team, cuts: &[(LinkKey, CutLink)]) -> CutReport {
+    fn open(&mut self, team: &mut Team, (cuts, joined): Crossed) -> CutReport {
         let known = self.octree.n_vertices() as u32;
-        let change = self.octree.cut(cuts);
+        let change = self.octree.cut(&cuts);
         let new_copies = self.number_copies(known, &change);
         let Self { octree, volumes, surface, own, .. } = self;
         let mut follow_volumes = || {
@@ -264,6 +281,7 @@ impl OctreeSpace {
             new_copies,
             elements_cut: self.changed.len(),
             faces_opened: change.links,
+            joined,
             epoch: self.epoch,
             ..CutReport::default()
         }
@@ -492,8 +510,8 @@ impl Space for OctreeSpace {
         blade: &BladeSweep,
         incision: u32,
     ) -> Result<CutReport, CutError> {
-        let cuts = self.search(team, x, blade, incision)?;
-        Ok(self.open(team, &cuts))
+        let crossed = self.search(team, x, blade, incision)?;
+        Ok(self.open(team, crossed))
     }
 
     fn begin_cut(
@@ -503,15 +521,14 @@ impl Space for OctreeSpace {
         blade: &BladeSweep,
         incision: u32,
     ) -> Result<(), CutError> {
-        let cuts = self.search(team, x, blade, incision)?;
-        self.under_way = Some((cuts, CutReport::default()));
+        self.under_way = Some(self.search(team, x, blade, incision)?);
         Ok(())
     }
 
     fn go_on_cutting(&mut self, team: &mut Team, work: &mut Work) -> Option<CutReport> {
-        let (cuts, _) = self.under_way.take()?;
-        work.book(cuts.len() / LINKS_PER_FRAGMENT);
-        Some(self.open(team, &cuts))
+        let crossed = self.under_way.take()?;
+        work.book(crossed.0.len() / LINKS_PER_FRAGMENT);
+        Some(self.open(team, crossed))
     }
 
     fn is_being_cut(&self) -> bool {
@@ -521,6 +538,7 @@ impl Space for OctreeSpace {
     fn reset(&mut self) -> Result<(), MeshError> {
         self.under_way = None;
         self.fronts.clear();
+        self.borders = Borders::default();
         self.changed.clear();
         self.only_cut = false;
         self.octree = (*self.initial).clone();
