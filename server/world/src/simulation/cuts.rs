@@ -76,6 +76,8 @@ pub(crate) struct Swept {
     pub body: usize,
     /// Number of its incision.
     pub incision: u32,
+    /// Number of the first incision of the cut that it is a part of.
+    pub cut: u32,
     /// Area that the blade swept inside the body [m²].
     pub area_m2: f64,
 }
@@ -176,10 +178,13 @@ impl Cuts {
             self.next += 1;
             if let (true, Ok(blade)) = (at.estimates, &blade) {
                 let area_m2 = at.bodies[body].body.swept_area(blade);
-                self.swept.push(Swept { body, incision, area_m2 });
+                self.swept.push(Swept { body, incision, cut: incision, area_m2 });
             }
             match blade.and_then(|blade| self.sweep(body, &blade, incision, at)) {
-                Ok(done) => tell_of_nothing_opened(&done, incision, &at.bodies[body], at.report),
+                Ok(done) => {
+                    join(&mut self.swept, body, incision, &done.joined);
+                    tell_of_nothing_opened(&done, incision, &at.bodies[body], at.report);
+                }
                 Err(reason) => at.report.tell(Level::Error, "cut-refused", &at.bodies[body].id, reason),
             }
         }
@@ -276,6 +281,9 @@ impl Cuts {
         if let Some(done) = &done {
             self.history.after(body, job.incision, before.epoch, done);
             self.tell(&mut at.bodies[body], &before, (done, job.incision), at.report);
+            if job.request.is_some() && done.pending_edges > 0 {
+                tell_of_nothing_opened(done, job.incision, &at.bodies[body], at.report);
+            }
         }
         Ok(done)
     }
@@ -355,7 +363,13 @@ impl Cuts {
             let (elements, copies) = (done.elements_cut, done.new_copies.len());
             let elements = if elements == 1 { "1 element".into() } else { format!("{elements} elements") };
             let copies = if copies == 1 { "1 new copy".into() } else { format!("{copies} new copies") };
-            let message = format!("incision {incision}: {elements}, {copies}");
+            let joined = match &done.joined[..] {
+                [] => String::new(),
+                [one] => format!("; it goes on with incision {one}"),
+                several => format!("; it goes on with incisions {}", numbers(several)),
+            };
+            let closed = if done.pending_edges > 0 { CLOSED } else { "" };
+            let message = format!("incision {incision}: {elements}, {copies}{joined}{closed}");
             report.tell(Level::Info, "cut-applied", &body.id, message);
         }
         if done.refused_edges > 0 {
@@ -374,6 +388,24 @@ impl Cuts {
             report.tell(Level::Warning, "skin-left", &body.id, message);
         }
     }
+}
+
+/// What a cut says that ends inside elements.
+const CLOSED: &str = "; the elements that it ends in stay closed until another cut begins at its border";
+
+/// Numbers in a sentence.
+fn numbers(numbers: &[u32]) -> String {
+    numbers.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// Notes that an incision is a part of the same cut as those that it has `joined`.
+fn join(swept: &mut [Swept], body: usize, incision: u32, joined: &[u32]) {
+    let of_body = |of: &&mut Swept| of.body == body;
+    let parts = swept.iter().filter(|of| of.body == body && joined.contains(&of.incision));
+    let mut cuts: Vec<u32> = parts.map(|of| of.cut).collect();
+    cuts.push(incision);
+    let first = cuts.iter().copied().min().unwrap_or(incision);
+    swept.iter_mut().filter(of_body).filter(|of| cuts.contains(&of.cut)).for_each(|of| of.cut = first);
 }
 
 /// Why a scene refuses cuts.
@@ -401,7 +433,7 @@ impl Job {
     }
 }
 
-/// Warns of a cut of the scene that opened nothing, with the reason.
+/// Warns of a cut that opened nothing, with the reason.
 fn tell_of_nothing_opened(done: &CutReport, incision: u32, body: &SimBody, report: &mut StepReport) {
     if done.elements_cut > 0 || done.refused_edges > 0 {
         return;
@@ -410,7 +442,8 @@ fn tell_of_nothing_opened(done: &CutReport, incision: u32, body: &SimBody, repor
         let size_mm = 1e3 * body.cell_m();
         format!(
             "incision {incision} is drawn on the surface and opens nothing, because it ends inside the elements \
-             it enters; cut deeper than a cell of {size_mm:.1} mm, or make the elements smaller"
+             it enters; cut deeper than a cell of {size_mm:.1} mm, go on with a cut that begins at its border, or \
+             make the elements smaller"
         )
     } else {
         format!("incision {incision} opens nothing: its sweep crosses no edge of an element")
@@ -422,16 +455,25 @@ fn tell_of_nothing_opened(done: &CutReport, incision: u32, body: &SimBody, repor
 /// their front is rounded down to whole elements.
 pub(crate) fn rounded_fronts(swept: &[Swept], bodies: &[SimBody]) -> Vec<String> {
     let mut doubts = Vec::new();
-    for Swept { body, incision, area_m2 } in swept {
-        let body = &bodies[*body];
-        let opened_m2 = body.body.opened_area(*incision);
+    let mut cuts: Vec<(usize, u32)> = swept.iter().map(|of| (of.body, of.cut)).collect();
+    cuts.sort_unstable();
+    cuts.dedup();
+    for cut in cuts {
+        let parts: Vec<&Swept> = swept.iter().filter(|of| (of.body, of.cut) == cut).collect();
+        let body = &bodies[cut.0];
+        let area_m2: f64 = parts.iter().map(|of| of.area_m2).sum();
+        let opened_m2: f64 = parts.iter().map(|of| body.body.opened_area(of.incision)).sum();
         if opened_m2 < LEAST_OPENED * area_m2 {
             let share = 100.0 * opened_m2 / area_m2;
+            let incisions: Vec<u32> = parts.iter().map(|of| of.incision).collect();
+            let act = match &incisions[..] {
+                [one] => format!("incision {one} acts"),
+                several => format!("incisions {} together act", numbers(several)),
+            };
             doubts.push(format!(
-                "body.{}: incision {incision} acts on {opened_m2:.3e} of the {area_m2:.3e} m² that its blade \
-                 swept ({share:.0} %), because its front is rounded down to whole elements with cells of {:.1} \
-                 mm; the error estimate does not include this. Make the elements smaller, or let element faces \
-                 lie on the front",
+                "body.{}: {act} on {opened_m2:.3e} of the {area_m2:.3e} m² that the blade swept ({share:.0} %), \
+                 because the front is rounded down to whole elements with cells of {:.1} mm; the error estimate \
+                 does not include this. Make the elements smaller, or let element faces lie on the front",
                 body.id,
                 1e3 * body.cell_m()
             ));
