@@ -4,6 +4,7 @@
 #![allow(non_snake_case)] // the symbols of the field: X, K
 
 mod adapt;
+mod adjoining;
 mod cells;
 mod combinations;
 mod conservation;
