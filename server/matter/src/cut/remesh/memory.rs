@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::complex::Complex;
-use crate::mesh::TET_EDGES;
 
 /// Nodes of an edge in ascending order.
 pub type EdgeKey = [u32; 2];
@@ -25,7 +24,7 @@ pub struct Crossing {
 /// rounding.
 const HALVED: f64 = 1e-9;
 
-/// The record of one incision.
+/// The record of one cut: an incision, or several that have joined.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Memory {
     /// Crossings of edges neither end of which lies on the cut surface.
@@ -73,16 +72,14 @@ impl Memory {
         self.crossings.extend(more);
     }
 
-    /// Takes over what another part of the same cut has crossed of an element with these nodes.
-    pub fn take_over(&mut self, other: &Self, tet: [u32; 4]) {
-        let on = tet.into_iter().filter_map(|n| Some((n, *other.on.get(&n)?)));
-        on.for_each(|(n, normal)| _ = self.on.entry(n).or_insert(normal));
-        for [i, j] in TET_EDGES {
-            let edge = [tet[i].min(tet[j]), tet[i].max(tet[j])];
-            if let Some(crossing) = other.crossings.get(&edge) {
-                self.crossings.entry(edge).or_insert(*crossing);
-            }
-        }
+    /// The record of a cut with two parts. Where both cross an edge, this one counts.
+    pub fn joined(mut self, later: Self) -> Self {
+        later
+            .crossings
+            .into_iter()
+            .for_each(|(edge, crossing)| _ = self.crossings.entry(edge).or_insert(crossing));
+        self.settle(later.on.into_iter());
+        self
     }
 
     /// Removes the crossings that a new cut surface has settled: those of edges at its nodes.

@@ -42,15 +42,8 @@ pub struct Selection {
 }
 
 /// Intersects the sweep with the edges of the mesh. If an incision crosses an edge several times, its first
-/// crossing counts. The elements `near` the sweep, ascending, must be all that it may meet. In these the incision takes
-/// over what the `earlier` parts of the same cut have crossed.
-pub fn cross(
-    complex: &Complex,
-    near: &[u32],
-    triangles: &[SweepTriangle],
-    earlier: &[&Memory],
-    memory: &mut Memory,
-) {
+/// crossing counts. The elements `near` the sweep, ascending, must be all that it may meet.
+pub fn cross(complex: &Complex, near: &[u32], triangles: &[SweepTriangle], memory: &mut Memory) {
     let boxes: Vec<(u32, [Vector3<f64>; 2])> = near
         .iter()
         .map(|&t| {
@@ -59,9 +52,6 @@ pub fn cross(
         })
         .filter(|(_, [low, high])| triangles.iter().any(|s| s.overlaps(low, high)))
         .collect();
-    for other in earlier {
-        boxes.iter().for_each(|(t, _)| memory.take_over(other, complex.tet(*t)));
-    }
     for triangle in triangles {
         let [p, q, r] = triangle.corners;
         let normal = (q - p).cross(&(r - p)) / triangle.double_area;

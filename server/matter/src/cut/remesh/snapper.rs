@@ -100,6 +100,7 @@ pub struct SnapCut {
 pub struct Snapper {
     how: MeshCut,
     settings: SnapSettings,
+    /// By [`Borders::cut_of`].
     memories: BTreeMap<u32, Memory>,
     fronts: BTreeMap<u32, Front>,
     borders: Borders,
@@ -175,10 +176,8 @@ impl Snapper {
         // Nodes may move before the faces open, so last blade positions are looked up first.
         let fronts = self.last_blades(&complex, blade, incision);
         let n_elements = mesh.mesh().tets.len();
-        let mut memory = self.memories.remove(&incision).unwrap_or_default();
-        let earlier: Vec<&Memory> =
-            joined.parts.iter().filter_map(|other| self.memories.get(other)).collect();
-        cross(&complex, &near, &triangles, &earlier, &mut memory);
+        let mut memory = self.memory_of(incision);
+        cross(&complex, &near, &triangles, &mut memory);
         let opened = match (self.how, self.settings.moves) {
             (MeshCut::Snap, Moves::Sound) => smooth(&mut complex, &mut memory),
             (MeshCut::Snap, moves) => snap(&mut complex, &mut memory, moves),
@@ -189,15 +188,8 @@ impl Snapper {
             }
             (MeshCut::Remove, _) => take_out(&mut complex, &mut memory, (incision, n_elements)),
         };
-        // What the sweep has opened, it has opened for those that it joins too.
-        for nodes in opened.iter().map(|opened| &opened.nodes) {
-            let on = || nodes.iter().filter_map(|n| Some((*n, *memory.on.get(n)?)));
-            for other in &joined.parts {
-                self.memories.entry(*other).or_default().settle(on());
-            }
-        }
         let pending = memory.crossings.len();
-        self.memories.insert(incision, memory);
+        self.memories.insert(self.borders.cut_of(incision), memory);
         let Some(opened) = opened else {
             self.tags = complex.into_tags();
             let report = SnapReport { pending, examined, ..SnapReport::default() };
@@ -217,6 +209,13 @@ impl Snapper {
         self.fronts = cut.fronts.iter().map(|(incision, ends)| (*incision, mesh.front(ends, x))).collect();
         mesh.pieces_near(x, &bounds(cut.borders.iter().flatten()));
         self.borders.bind_again(&cut.borders, &|corners| mesh.candidates_near(corners), x);
+    }
+
+    /// Takes out what the cut that the incision is a part of has crossed, in the order of the incisions.
+    fn memory_of(&mut self, incision: u32) -> Memory {
+        let cut = self.borders.cut_of(incision);
+        let parts = self.memories.extract_if(.., |id, _| self.borders.cut_of(*id) == cut);
+        parts.map(|(_, memory)| memory).reduce(Memory::joined).unwrap_or_default()
     }
 
     /// Opens the selected faces, and removes degenerate elements where nodes were moved.
@@ -258,12 +257,12 @@ impl Snapper {
         for memory in self.memories.values_mut() {
             memory.renumber(&complex, find);
         }
-        self.memories
-            .retain(|id, memory| *id == incision || !memory.crossings.is_empty() || !memory.on.is_empty());
+        self.memories.retain(|_, memory| !memory.crossings.is_empty() || !memory.on.is_empty());
         report.copied = complex.copied();
         let cut = compact(&complex, &number, &duplicates);
         self.tags = tags_of(&complex, &number);
-        report.pending = self.memories.get(&incision).map_or(0, |memory| memory.crossings.len());
+        report.pending =
+            self.memories.get(&self.borders.cut_of(incision)).map_or(0, |memory| memory.crossings.len());
         (report, cut)
     }
 
@@ -284,7 +283,7 @@ impl Snapper {
         // Nodes added on faces of a cut surface lie on it too.
         while let Some((tag, n, normal)) = self.added_on_surface(complex, n_nodes) {
             surface.insert(n);
-            self.memories.entry(tag).or_default().on.insert(n, normal);
+            self.memories.entry(self.borders.cut_of(tag)).or_default().on.insert(n, normal);
         }
         cleaned
     }
@@ -293,7 +292,7 @@ impl Snapper {
     /// normal of a node beside it.
     fn added_on_surface(&self, complex: &Complex<'_>, from: u32) -> Option<(u32, u32, Vector3<f64>)> {
         complex.tags().iter().filter(|(key, _)| key.iter().any(|n| *n >= from)).find_map(|(key, &tag)| {
-            let on = &self.memories.get(&tag)?.on;
+            let on = &self.memories.get(&self.borders.cut_of(tag))?.on;
             let n = key.iter().find(|n| **n >= from && !on.contains_key(n))?;
             Some((tag, *n, *key.iter().find_map(|n| on.get(n))?))
         })

@@ -49,6 +49,9 @@ pub struct Borders {
     cut_of: BTreeMap<u32, u32>,
 }
 
+/// Copies of the tets that may meet the box between two corners [m].
+type Near<'a> = dyn Fn(&[Vector3<f64>; 2]) -> Vec<[u32; 4]> + 'a;
+
 /// What a sweep joins.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Joined {
@@ -133,19 +136,14 @@ impl Borders {
         Joined { incisions: joined.into_iter().collect(), parts, triangles }
     }
 
-    fn cut_of(&self, incision: u32) -> u32 {
+    /// The cut that an incision is a part of: the number of one of its incisions.
+    pub fn cut_of(&self, incision: u32) -> u32 {
         self.cut_of.get(&incision).copied().unwrap_or(incision)
     }
 
     /// Remembers the edges of a sweep of `incision` by the material that they pass through. `near` gives the copies of
     /// the tets that may meet the box between two corners [m].
-    pub fn remember(
-        &mut self,
-        edges: &[Edge],
-        incision: u32,
-        near: &dyn Fn(&[Vector3<f64>; 2]) -> Vec<[u32; 4]>,
-        x: &[Vector3<f64>],
-    ) {
+    pub fn remember(&mut self, edges: &[Edge], incision: u32, near: &Near, x: &[Vector3<f64>]) {
         // Where the incision ended before, it goes on now.
         self.lines.retain(|line| line.incision != incision || !line.is_last);
         for edge in edges {
@@ -177,12 +175,7 @@ impl Borders {
 
     /// Binds the borders to the material of another mesh, in which their points are at `places` [m]. Arguments as of
     /// [`remember`](Self::remember).
-    pub(crate) fn bind_again(
-        &mut self,
-        places: &[Vec<Vector3<f64>>],
-        near: &dyn Fn(&[Vector3<f64>; 2]) -> Vec<[u32; 4]>,
-        x: &[Vector3<f64>],
-    ) {
+    pub(crate) fn bind_again(&mut self, places: &[Vec<Vector3<f64>>], near: &Near, x: &[Vector3<f64>]) {
         for (line, places) in self.lines.iter_mut().zip(places) {
             let [low, high] = bounds(places);
             let tets = near(&[low, high]);

@@ -57,8 +57,8 @@ fn a_search_near_the_sweep_finds_what_a_search_of_the_whole_mesh_finds() {
         let (near, examined) = mesh.pieces_near(&x, &sweep_bounds(&triangles, &blade));
         let all: Vec<u32> = (0..sample.mesh.tets.len() as u32).collect();
         let [mut here, mut everywhere] = [Memory::default(), Memory::default()];
-        cross(&complex, near, &triangles, &[], &mut here);
-        cross(&complex, &all, &triangles, &[], &mut everywhere);
+        cross(&complex, near, &triangles, &mut here);
+        cross(&complex, &all, &triangles, &mut everywhere);
         assert_eq!(here, everywhere);
         assert!(near.len() <= examined && examined <= all.len());
         fewer += usize::from(!here.crossings.is_empty() && near.len() < all.len() / 2);

@@ -2,6 +2,7 @@
 
 mod baselines;
 mod cuts;
+mod adjoining;
 mod degenerate;
 mod local;
 mod random;
