@@ -98,7 +98,7 @@ class Scene:
         return self._add("tool", id=id, **keys)
 
     def add_cut(self, body: str, **keys: Any) -> Scene:
-        """Adds a cut at the time ``at_s``, by ``sweep_m`` or by ``path_m`` and ``depth_m``."""
+        """Adds a cut at the time ``at_s``, by ``sweep_m``, by ``path_m`` and ``depth_m``, or along a ``plane``."""
         return self._add("cut", body=body, **keys)
 
     def add_probe(self, id: str, body: str, point_m: Vector) -> Scene:

@@ -1,5 +1,7 @@
 //! From a scene's tree to ready objects: what the schema cannot say is checked here.
 
+mod cut;
+
 mod held;
 
 mod look;
@@ -414,55 +416,6 @@ impl Check<'_> {
             self.report(at, Fault::UnknownName { what: "body", found: name.to_owned(), suggestion, known });
             0
         })
-    }
-
-    fn cut(&mut self, index: usize, cut: &RawCut) -> CutSpec {
-        let at = format!("cut.{index}");
-        let body = self.body_named(format!("{at}.body"), &cut.body);
-        self.cut_method(&at, cut, body);
-        if let (Some(path), Some(depth_m)) = (&cut.path_m, cut.depth_m) {
-            let points: Vec<Vector3<f64>> = path.iter().map(|p| Vector3::from(*p)).collect();
-            if points.windows(2).any(|pair| pair[0] == pair[1]) {
-                let next = "remove one of them";
-                self.conflict(format!("{at}.path_m"), "two points in a row are the same", next);
-            }
-            self.cutting_is_on(&at);
-            return CutSpec { body, at_s: cut.at_s, blade: CutPath::Incision { points, depth_m } };
-        }
-        match (&cut.path_m, cut.depth_m) {
-            (Some(_), None) => {
-                let meaning = "how deep the tool goes into the skin along `path_m` [m], such as 0.01".into();
-                self.report(at.clone(), Fault::MissingKey { key: "depth_m".into(), meaning });
-                return CutSpec { body, at_s: cut.at_s, blade: CutPath::Sweep(Vec::new()) };
-            }
-            (None, Some(_)) => {
-                let next = "remove it: a sweep goes as deep as its blade, or give the path as `path_m`";
-                self.conflict(format!("{at}.depth_m"), "`depth_m` only goes with `path_m`", next);
-            }
-            _ => {}
-        }
-        let segments: Vec<[Vector3<f64>; 2]> = cut
-            .sweep_m
-            .iter()
-            .flatten()
-            .map(|[tip, heel]| [Vector3::from(*tip), Vector3::from(*heel)])
-            .collect();
-        if segments.iter().all(|[tip, heel]| tip == heel) {
-            let next = "give each blade segment a tip and a heel that differ";
-            self.conflict(format!("{at}.sweep_m"), "all blade segments have zero length", next);
-        } else if segments.windows(2).all(|pair| pair[0] == pair[1]) {
-            let next = "give successive positions of the blade";
-            self.conflict(format!("{at}.sweep_m"), "the blade does not move", next);
-        }
-        self.cutting_is_on(&at);
-        CutSpec { body, at_s: cut.at_s, blade: CutPath::Sweep(segments) }
-    }
-
-    fn cutting_is_on(&mut self, at: &str) {
-        if self.raw.effects.cutting == Some(false) {
-            let next = "remove the cut or effects.cutting";
-            self.conflict(at.to_owned(), "effects.cutting = false, but the scene has a cut", next);
-        }
     }
 
     fn probe(&mut self, probe: &RawProbe) -> ProbeSpec {

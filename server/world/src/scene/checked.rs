@@ -369,6 +369,13 @@ pub enum CutPath {
         /// Depth below the skin [m].
         depth_m: f64,
     },
+    /// Along a plane, through the whole body.
+    Plane {
+        /// A point on the plane [m].
+        point_m: Vector3<f64>,
+        /// Unit vector across it.
+        normal: Unit<Vector3<f64>>,
+    },
 }
 
 /// A cut by time.

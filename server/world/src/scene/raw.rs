@@ -479,10 +479,11 @@ pub enum RawAxis {
     Z,
 }
 
-/// A scheduled cut: the sweep of a blade, or a path on the skin with a depth.
+/// A scheduled cut: the sweep of a blade, a path on the skin with a depth, or a whole plane.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{"required": ["sweep_m"]}, {"required": ["path_m", "depth_m"]}]))]
+#[schemars(extend("oneOf" = [{"required": ["sweep_m"]}, {"required": ["path_m", "depth_m"]},
+    {"required": ["plane"]}]))]
 pub struct RawCut {
     /// Body that is cut.
     pub body: String,
@@ -506,6 +507,19 @@ pub struct RawCut {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "only elements that the blade crosses completely open, unless cutting.front = calibrated"))]
     pub depth_m: Option<f64>,
+    /// A plane that cuts the deformed body all the way through.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plane: Option<RawCutPlane>,
+}
+
+/// A plane that cuts a body.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawCutPlane {
+    /// A point on the plane [m].
+    pub point_m: Vec3,
+    /// Vector across the plane. It may have any length except zero.
+    pub normal: Vec3,
 }
 
 /// A cutting method.

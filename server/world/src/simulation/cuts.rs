@@ -10,13 +10,13 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{Unit, Vector3};
 use scindo_physics::cut::{BladeSweep, CutReport, MAX_SEGMENTS, Work};
 use scindo_physics::skin::Skin;
 
 use super::incision::incision_along;
 use super::undo::{History, Undone};
-use crate::body::SimBody;
+use crate::body::{SimBody, bounds};
 use crate::inputs::{CutOutcome, CutRequest};
 use crate::report::{Level, StepReport};
 use crate::scene::{CutPath, CutSpec};
@@ -171,6 +171,9 @@ impl Cuts {
             let body = due.body;
             let blade = match &due.blade {
                 CutPath::Sweep(segments) => Ok(BladeSweep { segments: segments.clone() }),
+                CutPath::Plane { point_m, normal } => {
+                    Ok(across(at.bodies[body].body.positions(), *point_m, *normal))
+                }
                 CutPath::Incision { points, depth_m } => {
                     incision_along(&mut at.bodies[body], points, *depth_m, self.least_move_m)
                 }
@@ -388,6 +391,19 @@ impl Cuts {
             report.tell(Level::Warning, "skin-left", &body.id, message);
         }
     }
+}
+
+/// A blade that moves along a plane, through `point` [m], past all of the positions `x` [m].
+fn across(x: &[Vector3<f64>], point: Vector3<f64>, normal: Unit<Vector3<f64>>) -> BladeSweep {
+    let (low, high) = bounds(x);
+    let (middle, reach) = ((low + high) / 2.0, (high - low).norm());
+    let foot = middle - normal.into_inner() * normal.dot(&(middle - point));
+    // The axis that the plane is least inclined to.
+    let axis = Vector3::ith(normal.abs().imin(), 1.0);
+    let along = normal.cross(&axis).normalize() * reach;
+    let across = normal.cross(&along);
+    let blade = |at: Vector3<f64>| [at - across, at + across];
+    BladeSweep { segments: vec![blade(foot - along), blade(foot + along)] }
 }
 
 /// What a cut says that ends inside elements.

@@ -146,7 +146,18 @@ const AT_ONCE: &[Mistake] = &[
         &["cut.0.path_m: leaves the body at 1 of its 2 points"],
     ),
     (SWEEP, "path_m = [[0.02, 0.05, 0.1], [0.08, 0.05, 0.1]]", &["cut.0", "key `depth_m` is missing"]),
-    (SWEEP, "", &["needs exactly one of sweep_m, path_m"]),
+    (
+        SWEEP,
+        "plane = { point_m = [0, 0, 0.4], normal = [0, 0, 2] }",
+        &["cut.0.plane: passes 30 cm beside body `block`"],
+    ),
+    (SWEEP, "plane = { point_m = [0, 0, 0.05], normal = [0, 0, 0] }", &["cut.0.plane.normal", "zero length"]),
+    (
+        SWEEP,
+        "plane = { point_m = [0, 0, 0.05], normal = [0, 0, 1] }\ndepth_m = 0.01",
+        &["cut.0.depth_m", "only goes with `path_m`"],
+    ),
+    (SWEEP, "", &["needs exactly one of sweep_m, path_m, plane"]),
     ("at_s = 0.2", "at_s = 7.5", &["cut.0.at_s: the cut comes at 7.5 s, after the end of the run at 5 s"]),
     (BODY_END, "element = \"hex8\"", &["hex8", "tet4, tet10"]),
     (

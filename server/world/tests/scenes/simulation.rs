@@ -51,6 +51,30 @@ fn refusal(text: &str) -> String {
     Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap_err().to_string()
 }
 
+/// Wherever a plane lies and however far the body has moved, it parts the body; every method does.
+#[test]
+fn a_plane_cuts_a_moving_body_all_the_way_through() {
+    let ways = [
+        ("", "xfem"),
+        ("element = \"tet10\"", "xfem"),
+        ("", "snap"),
+        ("", "subdivide"),
+        ("element = \"octree\"", "links"),
+    ];
+    let block = BEAM.replace("cells = [3, 6, 15], pattern = \"tet5\"", "cells = [3, 6, 20]");
+    for (element, method) in ways {
+        let how = format!("{element}\ncutting = {{ method = \"{method}\" }}\nyoung_pa = 2e4");
+        let mut text = block.replace("young_pa = 3e5", &how);
+        for (at_s, height, normal) in [(0.0, 0.051, "[0.2, -0.3, 1]"), (0.06, 0.113, "[-3, 5, 40]")] {
+            let plane = format!("{{ point_m = [0.01, 0.02, {height}], normal = {normal} }}");
+            text += &format!("[[cut]]\nbody = \"beam\"\nat_s = {at_s}\nplane = {plane}\n");
+        }
+        let mut sim = start(&text);
+        run(&mut sim, 0.1);
+        assert_eq!(sim.bodies()[0].body.parts().len(), 3, "{element} {method}");
+    }
+}
+
 #[test]
 fn a_beam_under_gravity_bends_and_comes_to_rest() {
     let mut sim = start(BEAM);

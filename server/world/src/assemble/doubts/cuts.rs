@@ -1,6 +1,6 @@
 //! Scheduled cuts that pass beside their body, or come after the end of the run.
 
-use nalgebra::Vector3;
+use nalgebra::{Unit, Vector3};
 use scindo_collision::SurfaceBvh;
 
 use crate::body::{SimBody, bounds};
@@ -16,6 +16,7 @@ pub(super) fn doubts(cuts: &[CutSpec], bodies: &mut [SimBody], doubts: &mut Vec<
         let Some(body) = bodies.get_mut(cut.body) else { continue };
         match &cut.blade {
             CutPath::Sweep(segments) => sweep(number, segments, body, doubts),
+            CutPath::Plane { point_m, normal } => plane(number, *point_m, *normal, body, doubts),
             CutPath::Incision { points, depth_m } => path(number, points, *depth_m, body, doubts),
         }
     }
@@ -29,6 +30,26 @@ fn sweep(number: usize, segments: &[[Vector3<f64>; 2]], body: &SimBody, doubts: 
             "cut.{number}.sweep_m: reaches from {} to {} m and passes beside body `{}`, which lies from {} to {} m",
             coordinates(&from.into()),
             coordinates(&to.into()),
+            body.id,
+            coordinates(&low.into()),
+            coordinates(&high.into())
+        ));
+    }
+}
+
+fn plane(
+    number: usize,
+    point: Vector3<f64>,
+    normal: Unit<Vector3<f64>>,
+    body: &SimBody,
+    doubts: &mut Vec<String>,
+) {
+    let sides = || body.body.positions().iter().map(|x| normal.dot(&(x - point)));
+    if sides().all(|side| side > 0.0) || sides().all(|side| side < 0.0) {
+        let (low, high) = bounds(body.body.positions());
+        doubts.push(format!(
+            "cut.{number}.plane: passes {} beside body `{}`, which lies from {} to {} m",
+            length(sides().fold(f64::INFINITY, |least, side| least.min(side.abs()))),
             body.id,
             coordinates(&low.into()),
             coordinates(&high.into())
