@@ -72,6 +72,8 @@ pub struct BodySettings {
     pub arithmetic: Option<Arithmetic>,
     /// Largest number of Newton steps per time step; `None` for as many as law and scheme need.
     pub newton_steps: Option<u32>,
+    /// Explicit schemes: most parts into which a step longer than the stable one is divided; 1 refuses such a step.
+    pub most_substeps: u32,
     /// Inside elements or along their faces.
     pub cutting: CuttingMethod,
     /// How far a cut inside elements goes on ahead of the blade.
@@ -134,6 +136,7 @@ impl Default for BodySettings {
             operator: OperatorChoice::Auto,
             arithmetic: None,
             newton_steps: None,
+            most_substeps: 256,
             cutting: CuttingMethod::Xfem,
             front: FrontRule::default(),
             snap: SnapSettings::default(),
@@ -334,8 +337,8 @@ impl BodySettings {
             linearised: self.is_linearised(law),
             newton,
             relaxation,
+            most_substeps: self.most_substeps,
             ablation: self.ablation,
-            ..DynamicsSettings::default()
         }
     }
 

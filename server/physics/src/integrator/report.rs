@@ -57,6 +57,27 @@ impl SolveReport {
             && self.residual > self.tolerance.max(self.rounding)
     }
 
+    /// Report of a step of two parts, of which `next` is the second.
+    pub fn then(&self, next: &Self) -> Self {
+        let excess = |part: &Self| part.residual / part.tolerance.max(part.rounding).max(f64::MIN_POSITIVE);
+        let worse = if excess(next) >= excess(self) { next } else { self };
+        Self {
+            iterations: self.iterations + next.iterations,
+            residual: worse.residual,
+            tolerance: worse.tolerance,
+            rounding: worse.rounding,
+            stop: worse.stop,
+            substeps: self.substeps.max(next.substeps),
+            inverted_pieces: self.inverted_pieces.max(next.inverted_pieces),
+            refused_springs: self.refused_springs.max(next.refused_springs),
+            newton_steps: self.newton_steps + next.newton_steps,
+            backtracks: self.backtracks + next.backtracks,
+            internal_work_j: self.internal_work_j + next.internal_work_j,
+            notice: next.notice.or(self.notice),
+            ..*next
+        }
+    }
+
     /// Whether energy came from nowhere again in this step and those just before it: the body may shake for ever.
     pub fn is_unbalanced(&self) -> bool {
         matches!(self.notice, Some(Notice::Unbalanced { again: true, .. }))

@@ -203,6 +203,7 @@ impl Builder<'_> {
             }
         }
         body.fixed_iterations = spec.mechanics.fixed_iterations;
+        body.sub_steps = spec.mechanics.sub_steps;
         body.displacement = spec.displacement.clone();
         if let Some(adapt) = spec.octree.and_then(|octree| octree.adapt) {
             let held = spec.fixes.iter().map(|fix| fix.region.clone()).collect();

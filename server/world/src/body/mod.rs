@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use scindo_physics::body::estimate::{MeshError, StressRecovery};
-use scindo_physics::body::{AdaptReport, Body, BodyError, Notice, PointSpring, SolveReport};
+use scindo_physics::body::{AdaptReport, Body, BodyError, Notice, Outcome, PointSpring, SolveReport};
 use scindo_physics::cut::IncisionMark;
 
 use crate::mesh_in::MeshHealth;
@@ -52,6 +52,8 @@ pub struct SimBody {
     pub rest_volume_m3: f64,
     /// Whether the scene sets a fixed number of iterations and accepts any residual.
     pub fixed_iterations: bool,
+    /// Steps that it makes in each step of the world.
+    pub(crate) sub_steps: u32,
     /// What share of prescribed displacements is reached when.
     pub displacement: Course,
     /// What share of every force that changes over time acts when, in the order of the scene.
@@ -112,6 +114,7 @@ impl SimBody {
             texture: None,
             rest_volume_m3,
             fixed_iterations: false,
+            sub_steps: 1,
             displacement: Course::default(),
             loads: Vec::new(),
             pressures: Vec::new(),
@@ -129,16 +132,23 @@ impl SimBody {
         }
     }
 
-    /// Makes one step that ends at `time_s` [s].
+    /// Makes one step of `h` [s] that ends at `time_s` [s], by sub-steps.
     pub(crate) fn step(
         &mut self,
         (time_s, h): (f64, f64),
         gravity_m_s2: Vector3<f64>,
         springs: &[PointSpring],
     ) -> SolveReport {
-        self.prescribe(time_s);
-        let solve = self.body.step(h, gravity_m_s2, springs);
-        self.as_it_ended(solve)
+        let mut whole: Option<SolveReport> = None;
+        for (end_s, h) in sub_steps(self.sub_steps, (time_s, h)) {
+            self.prescribe(end_s);
+            let part = self.body.step(h, gravity_m_s2, springs);
+            whole = Some(whole.map_or(part, |whole| whole.then(&part)));
+            if part.outcome != Outcome::Advanced {
+                break;
+            }
+        }
+        self.as_it_ended(whole.unwrap_or_default())
     }
 
     /// Sets prescribed displacements and loads to those of a step that ends at `time_s` [s].
@@ -398,6 +408,12 @@ impl SimBody {
         let topology = || Arc::new(SurfaceTopology { epoch, ..shown::topology(body) });
         self.topology.get_or_insert_with(topology).clone()
     }
+}
+
+/// When each of `parts` equal parts of a step of `h` [s] ends that ends at `time_s` [s], and how long it is [s].
+pub(crate) fn sub_steps(parts: u32, (time_s, h): (f64, f64)) -> impl Iterator<Item = (f64, f64)> {
+    let part_s = h / f64::from(parts);
+    (0..parts).rev().map(move |left| (time_s - f64::from(left) * part_s, part_s))
 }
 
 /// Corners of the box around some points [m].

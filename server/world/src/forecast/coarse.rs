@@ -108,6 +108,7 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
         load(&mut body, &fine.body)?;
         let mut body = SimBody::new(&spec.id, body, None);
         body.displacement = fine.displacement.clone();
+        body.sub_steps = fine.sub_steps;
         bodies.push(body);
     }
     let obstacles = simulation.obstacles().to_vec();

@@ -42,6 +42,10 @@ pub struct Mechanics {
     pub pressed: bool,
     /// Time integration.
     pub integrator: RawIntegrator,
+    /// Steps that the body makes in each step of the world.
+    pub sub_steps: u32,
+    /// Most stable steps that an explicit integrator may divide a step into.
+    pub most_stable_steps: Option<u32>,
     /// Parameters of Newmark's method, used by it alone.
     pub newmark: Newmark,
     /// Mass matrix.
@@ -199,6 +203,7 @@ impl Mechanics {
                 Some(RawOperator::Assembled) => OperatorChoice::Assembled,
             },
             newton_steps: self.newton_steps,
+            most_substeps: self.most_stable_steps.unwrap_or(BodySettings::default().most_substeps),
             cutting: match self.cutting {
                 // An octree has no other method.
                 RawCutMethod::Xfem | RawCutMethod::Links => CuttingMethod::Xfem,

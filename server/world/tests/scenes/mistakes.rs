@@ -129,6 +129,12 @@ const AT_ONCE: &[Mistake] = &[
         "point_m = [0.02, 0.05, 0.3]",
         &["outside the body", "nearest point inside"],
     ),
+    (
+        "young_pa",
+        "most_stable_steps = 9\nyoung_pa",
+        &["most_stable_steps", "explicit integrators", "sub_steps"],
+    ),
+    ("young_pa", "sub_steps = 0\nyoung_pa", &["sub_steps", "1"]),
     // cuts
     (
         SWEEP,

@@ -51,6 +51,54 @@ fn refusal(text: &str) -> String {
     Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap_err().to_string()
 }
 
+/// Sub-steps of a body are steps of a shorter step of the world, also where nodes are drawn meanwhile.
+#[test]
+fn sub_steps_are_shorter_steps() {
+    for integrator in ["implicit-euler", "bdf2", "newmark", "rk4"] {
+        let drawn = "[[body.fix]]\nwhere = { slab = { axis = \"z\", from = 1, to = 1 } }\ndisplacement_m = [0, 0, 0.01]\n";
+        let text = BEAM.replace("young_pa = 3e5", &format!("integrator = \"{integrator}\"\nyoung_pa = 3e4"));
+        let text = format!("{}{drawn}", text.replace("rayleigh", "displacement_over_s = 0.16\nrayleigh"));
+        let mut short = start(&text.replace("step_s = 0.01", "step_s = 0.005"));
+        let mut whole = start(
+            &text.replace("step_s = 0.01", "step_s = 0.02").replace("poisson", "sub_steps = 4\npoisson"),
+        );
+        run(&mut short, 40);
+        run(&mut whole, 10);
+        let apart = |(a, b): (&Vector3<f64>, &Vector3<f64>)| (a - b).norm();
+        let [a, b] = [&short, &whole].map(|sim| sim.bodies()[0].body.positions());
+        let farthest = a.iter().zip(b).map(apart).fold(0.0, f64::max);
+        assert!(farthest < 1e-7, "{integrator}: {farthest:e} m");
+        assert_eq!(whole.bodies()[0].counts().steps, 10);
+    }
+}
+
+/// Bodies that touch take as many sub-steps as one of them wants, and rest as without.
+#[test]
+fn bodies_that_touch_take_sub_steps_together() {
+    let stack = |sub_steps: u32| {
+        let block = |id: &str, from: f64, more: &str| {
+            format!(
+                "[[body]]\nid = \"{id}\"\nmesh = {{ box = {{ min_m = [0, 0, {from}], max_m = [0.1, 0.1, {}], cells = [3, 3, 3] }} }}\n\
+                 young_pa = 2e4\npoisson = 0.3\ndensity_kg_m3 = 1000\nrayleigh = {{ mass_1_s = 5, stiffness_s = 0.02 }}\n{more}",
+                from + 0.1
+            )
+        };
+        let fix = "[[body.fix]]\nwhere = { slab = { axis = \"z\", from = 0, to = 0 } }\n";
+        let text = format!(
+            "schema = 1\nworld = {{ gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }}\neffects = {{ body_collision = true }}\n{}{}",
+            block("lower", 0.0, fix),
+            block("upper", 0.1005, &format!("sub_steps = {sub_steps}\n"))
+        );
+        let mut sim = start(&text);
+        run(&mut sim, 200);
+        let top = sim.bodies()[1].body.positions().iter().map(|x| x.z).fold(0.0, f64::max);
+        assert!(sim.bodies().iter().all(|body| body.counts().rolled_back + body.counts().unbalanced == 0));
+        top
+    };
+    let [one, four] = [1, 4].map(stack);
+    assert!((one - four).abs() < 2e-4 && one > 0.18, "{one} {four}");
+}
+
 /// Wherever a plane lies and however far the body has moved, it parts the body; every method does.
 #[test]
 fn a_plane_cuts_a_moving_body_all_the_way_through() {
@@ -70,7 +118,7 @@ fn a_plane_cuts_a_moving_body_all_the_way_through() {
             text += &format!("[[cut]]\nbody = \"beam\"\nat_s = {at_s}\nplane = {plane}\n");
         }
         let mut sim = start(&text);
-        run(&mut sim, 0.1);
+        run(&mut sim, 10);
         assert_eq!(sim.bodies()[0].body.parts().len(), 3, "{element} {method}");
     }
 }

@@ -22,6 +22,8 @@ impl Check<'_> {
             ),
             pressed: body.load.iter().any(|load| load.pressure_pa.is_some()),
             integrator: body.integrator,
+            sub_steps: body.sub_steps,
+            most_stable_steps: body.most_stable_steps,
             newmark: Newmark { beta: newmark.beta, gamma: newmark.gamma },
             mass: body.mass,
             locking: body.locking,
@@ -192,6 +194,17 @@ impl Check<'_> {
             let what =
                 format!("`newmark` only goes with integrator newmark, found {}", word(&body.integrator));
             self.conflict(format!("{at}.newmark"), what, "remove it or write integrator = \"newmark\"");
+        }
+        if body.most_stable_steps.is_some() && !body.integrator.is_explicit() {
+            let what = format!(
+                "`most_stable_steps` only goes with explicit integrators, found {}",
+                word(&body.integrator)
+            );
+            self.conflict(format!("{at}.most_stable_steps"), what, "remove it, or write sub_steps");
+        }
+        if body.integrator == RawIntegrator::Static && body.sub_steps > 1 {
+            let what = format!("found {} in a static body, allowed: 1", body.sub_steps);
+            self.conflict(format!("{at}.sub_steps"), what, "remove it; an equilibrium has no steps in time");
         }
         if body.integrator == RawIntegrator::Static {
             self.statics(at, body);

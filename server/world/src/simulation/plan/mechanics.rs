@@ -85,6 +85,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         RawIntegrator::Bdf2 => "BDF2".into(),
         RawIntegrator::Newmark => format!("Newmark {} {}", m.newmark.beta, m.newmark.gamma),
     };
+    let steps = if m.sub_steps > 1 { format!(" in {} sub-steps", m.sub_steps) } else { String::new() };
     let mass = match m.mass {
         RawMass::Lumped => "",
         RawMass::Menouillard => ", mass after Menouillard",
@@ -145,11 +146,15 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         format!("general path for {why}, assembled")
     };
     let elements = size.elements;
-    format!("{elements} {element}{remedy}, {law}; {integrator}{mass}; {solver}; {path}")
+    format!("{elements} {element}{remedy}, {law}; {integrator}{steps}{mass}; {solver}; {path}")
 }
 
-/// Predicted seconds per step.
+/// Predicted seconds per step of the world.
 fn seconds(m: &Mechanics, size: &BodySize) -> f64 {
+    f64::from(m.sub_steps) * seconds_of_one(m, size)
+}
+
+fn seconds_of_one(m: &Mechanics, size: &BodySize) -> f64 {
     let elements = size.elements as f64;
     if m.arithmetic() == Arithmetic::Single {
         return m.body_settings().fast_seconds(m.constitutive_law(), size.elements);
