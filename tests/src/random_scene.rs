@@ -127,7 +127,7 @@ fn body(rng: &mut Rng, index: u32, toml: &mut String) -> Body {
 /// Law, integrator, solver and the like; now and then settings that do not go together.
 fn mechanics(rng: &mut Rng, body: &Body, toml: &mut String) {
     let law = pick(rng, &["linear", "corotational", "corotational", "stvk", "neo-hookean"]);
-    let integrators = ["implicit-euler", "implicit-euler", "implicit-euler", "bdf2", "newmark", "static"];
+    let integrators = ["implicit-euler", "implicit-euler", "bdf2", "newmark", "generalised-alpha", "static"];
     let explicit = rng.u32(0..6) == 0;
     let integrator = match explicit {
         true => pick(rng, &["symplectic-euler", "midpoint", "rk4"]),

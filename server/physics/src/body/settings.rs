@@ -225,7 +225,7 @@ impl BodySettings {
         let easy = self.is_easy(law);
         self.newton_steps.unwrap_or(match self.scheme {
             Scheme::Static => STATIC_NEWTON_STEPS,
-            Scheme::Newmark { .. } if easy => 2,
+            scheme if scheme.is_newmark() && easy => 2,
             _ if easy => 1,
             _ => NEWTON_STEPS,
         })
@@ -397,6 +397,11 @@ impl BodySettings {
                 (changes, "cutting that changes the mesh", "cutting method xfem"),
                 (self.scheme.is_explicit(), "an explicit integrator", "an implicit one"),
                 (self.relaxation, "relaxation", "a solver of the static integrator"),
+                (
+                    matches!(self.scheme, Scheme::GeneralisedAlpha { .. }),
+                    "generalised-alpha, whose forces are not those of the end of a step",
+                    "bdf2",
+                ),
             ];
             if let Some((_, with, instead)) = why.into_iter().find(|why| why.0) {
                 return refused("viscoelasticity", with, instead);

@@ -25,6 +25,7 @@ use super::report::{Outcome, SolveReport};
 use super::scheme::{DynamicsError, Scheme};
 use super::settings::DynamicsSettings;
 use super::state::State;
+use super::statics::prescribe;
 use super::step_inputs::StepInputs;
 use super::step_solver::{SolverSettings, StepSolver};
 use super::together::Member;
@@ -43,6 +44,8 @@ pub struct Dynamics {
     /// Prescribed directions for which these were found; `None` after a change of the topology.
     known_fixed: Option<Vec<FixedCopy>>,
     f_ext: Vec<Vector3<f64>>,
+    /// Prescribed nodes where the equations of generalised-α hold.
+    between: Vec<FixedCopy>,
 }
 
 impl Dynamics {
@@ -51,8 +54,8 @@ impl Dynamics {
         scheme.check()?;
         let multistep = Multistep::new(scheme, solver.model().is_some());
         let course = Course { multistep, ..Course::default() };
-        let (free_motions, f_ext) = (Vec::new(), Vec::new());
-        Ok(Self { scheme, law, course, solver, free_motions, known_fixed: None, f_ext })
+        let (free_motions, f_ext, between) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { scheme, law, course, solver, free_motions, known_fixed: None, f_ext, between })
     }
 
     /// Steps of a discrete model in double precision.
@@ -322,8 +325,28 @@ impl Dynamics {
         report: &mut SolveReport,
         spring_forces: &mut [Vector3<f64>],
     ) {
-        let Self { course, solver, .. } = self;
-        solver.attempt(team, course, state, (scheme, inputs), (report, spring_forces));
+        let Self { course, solver, between, .. } = self;
+        let share = scheme.alpha().map_or(1.0, |alpha| 1.0 - alpha.alpha_f);
+        if share == 1.0 {
+            return solver.attempt(team, course, state, (scheme, inputs), (report, spring_forces));
+        }
+        // The equations hold between the ends of the step, so prescribed nodes stand there.
+        between.clear();
+        between.extend(inputs.fixed.iter().map(|fixed| {
+            let from = course.before.x[fixed.copy as usize];
+            let to = Vector3::from(fixed.position_m);
+            FixedCopy { position_m: (from + (to - from) * share).into(), ..*fixed }
+        }));
+        let inner = StepInputs { fixed: between, ..*inputs };
+        solver.attempt(team, course, state, (scheme, &inner), (report, spring_forces));
+        if report.scheme == scheme {
+            let State { x: from_x, v: from_v, .. } = &course.before;
+            state.x.iter_mut().zip(from_x).for_each(|(x, from)| *x = from + (*x - from) / share);
+            state.v.iter_mut().zip(from_v).for_each(|(v, from)| *v = from + (*v - from) / share);
+            report.internal_work_j /= share;
+            report.elastic_j = None;
+        }
+        prescribe(inputs.fixed, &mut state.x);
     }
 
     /// Begins the energy balance of a step from `state`. Returns kinetic and elastic energy [J] there.

@@ -77,7 +77,7 @@ impl ModelSolver {
         let Course { multistep, before, .. } = course;
         let Some(history) = multistep.extrapolate(team, before, (scheme, inputs.h)) else { return };
         match scheme {
-            Scheme::Newmark { .. } => {
+            scheme if scheme.is_newmark() => {
                 let known = before.x.iter().zip(&before.v);
                 state.x.iter_mut().zip(known).for_each(|(next, (x, v))| *next = x + inputs.h * v);
             }

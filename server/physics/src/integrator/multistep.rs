@@ -161,7 +161,7 @@ impl Multistep {
                 self.history.why_no_bdf2(h, turn, touching)
             }
             // Where several solves are made per step, the energy balance alone decides.
-            Scheme::Newmark { .. } if !self.judges_all => {
+            scheme if scheme.is_newmark() && !self.judges_all => {
                 let angle = Some(turn()).filter(|angle| *angle > LARGEST_TURN);
                 angle.map(|angle_rad| Notice::Spinning { angle_rad })
             }
@@ -205,15 +205,16 @@ impl Multistep {
                 });
                 Increment::bdf2(h)
             }
-            Scheme::Newmark { beta, gamma } => {
+            Scheme::Newmark { .. } | Scheme::GeneralisedAlpha { .. } => {
+                let alpha = scheme.alpha()?;
                 team.for_blocks(both, |block, (x_v, x_a)| {
                     for (i, (x_v, x_a)) in x_v.iter_mut().zip(x_a).enumerate() {
                         let c = block * BLOCK + i;
                         let now = [&state.x[c], &state.v[c], &acceleration[c]];
-                        [*x_v, *x_a] = newmark_history(h, (beta, gamma), now);
+                        [*x_v, *x_a] = newmark_history(h, alpha, now);
                     }
                 });
-                Increment::newmark(h, beta, gamma)
+                Increment::alpha(h, alpha)
             }
             _ if !self.judges_all => return None,
             Scheme::Static => {
@@ -275,18 +276,23 @@ impl Multistep {
         if !self.remembers() {
             return;
         }
-        if self.scheme.is_newmark() {
-            let increment = match scheme {
-                Scheme::Newmark { beta, gamma } => Increment::newmark(inputs.h, beta, gamma),
-                _ => Increment::euler(inputs.h),
-            };
-            for (c, a) in self.acceleration.iter_mut().enumerate() {
-                let from = match scheme {
-                    Scheme::Newmark { .. } => self.x_a[c],
-                    _ => before.x[c] + inputs.h * before.v[c],
-                };
-                *a = increment.A * (state.x[c] - from);
+        match scheme.alpha() {
+            Some(alpha) => {
+                let A = Increment::newmark(inputs.h, alpha.beta, alpha.gamma).A;
+                let known = before.x.iter().zip(&before.v).zip(&state.x);
+                for (a, ((x, v), next)) in self.acceleration.iter_mut().zip(known) {
+                    let x_a = x + inputs.h * v + inputs.h * inputs.h * (0.5 - alpha.beta) * *a;
+                    *a = A * (next - x_a);
+                }
             }
+            None if self.scheme.is_newmark() => {
+                let A = Increment::euler(inputs.h).A;
+                let known = before.x.iter().zip(&before.v).zip(&state.x);
+                for (a, ((x, v), next)) in self.acceleration.iter_mut().zip(known) {
+                    *a = A * (next - (x + inputs.h * v));
+                }
+            }
+            None => {}
         }
         self.history.push(before, state, inputs.h);
         if self.scheme == Scheme::Bdf2 {

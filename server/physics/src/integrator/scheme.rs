@@ -14,6 +14,12 @@ pub enum DynamicsError {
         /// γ.
         gamma: f64,
     },
+    /// The spectral radius is out of range.
+    #[error("spectral radius {spectral_radius} of generalised-alpha: it must be in [0, 1]")]
+    SpectralRadius {
+        /// ρ∞.
+        spectral_radius: f64,
+    },
 }
 
 /// A time integration scheme. h is the step, a = M⁻¹ (f_ext − f_int − D v).
@@ -44,6 +50,23 @@ pub enum Scheme {
         /// γ ≥ ½; the scheme is unconditionally stable for linear bodies if 2β ≥ γ.
         gamma: f64,
     },
+    /// M ((1 − α_m) a⁺ + α_m a) + D v_α + f_int(x_α) = f_ext with x_α = (1 − α_f) x⁺ + α_f x, v_α alike, and the x⁺ and
+    /// v⁺ of Newmark's method (Chung, Hulbert 1993). Second order; dissipates fast oscillations alone.
+    GeneralisedAlpha {
+        /// ρ∞, from 0 to 1: what a step leaves of the fastest oscillations. 1 dissipates nothing.
+        spectral_radius: f64,
+    },
+}
+
+/// Parameters of Newmark's method and its generalisation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Alpha {
+    pub beta: f64,
+    pub gamma: f64,
+    /// Weight of the acceleration at the start of the step in the equations.
+    pub alpha_m: f64,
+    /// Weight of position and velocity there.
+    pub alpha_f: f64,
 }
 
 impl Scheme {
@@ -57,12 +80,25 @@ impl Scheme {
 
     /// Whether a step needs more than the state before it.
     pub fn remembers(self) -> bool {
-        matches!(self, Self::Bdf2 | Self::Newmark { .. })
+        self == Self::Bdf2 || self.is_newmark()
     }
 
-    /// Whether it is a method of Newmark.
+    /// Whether it is a method of Newmark, or its generalisation.
     pub fn is_newmark(self) -> bool {
-        matches!(self, Self::Newmark { .. })
+        self.alpha().is_some()
+    }
+
+    /// Its parameters, if it is a method of Newmark or its generalisation.
+    pub(super) fn alpha(self) -> Option<Alpha> {
+        match self {
+            Self::Newmark { beta, gamma } => Some(Alpha { beta, gamma, alpha_m: 0.0, alpha_f: 0.0 }),
+            Self::GeneralisedAlpha { spectral_radius: rho } => {
+                let (alpha_m, alpha_f) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
+                let gamma = 0.5 - alpha_m + alpha_f;
+                Some(Alpha { beta: 0.25 * (0.5 + gamma).powi(2), gamma, alpha_m, alpha_f })
+            }
+            _ => None,
+        }
     }
 
     /// Whether it is an implicit scheme with inertia.
@@ -75,6 +111,9 @@ impl Scheme {
         match self {
             Self::Newmark { beta, gamma } if !(beta > 0.0 && beta <= 1.0 && (0.5..=2.0).contains(&gamma)) => {
                 Err(DynamicsError::Newmark { beta, gamma })
+            }
+            Self::GeneralisedAlpha { spectral_radius } if !(0.0..=1.0).contains(&spectral_radius) => {
+                Err(DynamicsError::SpectralRadius { spectral_radius })
             }
             _ => Ok(()),
         }
@@ -90,6 +129,7 @@ impl Scheme {
             Self::ImplicitEuler => "implicit-euler",
             Self::Bdf2 => "bdf2",
             Self::Newmark { .. } => "newmark",
+            Self::GeneralisedAlpha { .. } => "generalised-alpha",
         }
     }
 }

@@ -17,7 +17,7 @@ const SIZE: Vector3<f64> = Vector3::new(0.2, 0.1, 0.1);
 const CELLS: [usize; 3] = [4, 2, 2];
 
 const ELEMENTS: [ElementKind; 3] = [ElementKind::Tet4, ElementKind::Tet10, ElementKind::Hex8];
-const SCHEMES: [Scheme; 7] = [
+const SCHEMES: [Scheme; 8] = [
     Scheme::Static,
     Scheme::SymplecticEuler,
     Scheme::Midpoint,
@@ -25,6 +25,7 @@ const SCHEMES: [Scheme; 7] = [
     Scheme::ImplicitEuler,
     Scheme::Bdf2,
     Scheme::Newmark { beta: 0.25, gamma: 0.5 },
+    Scheme::GeneralisedAlpha { spectral_radius: 0.8 },
 ];
 const METHODS: [Method; 3] = [Method::Cg, Method::Pcg, Method::Cholesky];
 

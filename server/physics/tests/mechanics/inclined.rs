@@ -18,13 +18,14 @@ type V = Vector3<f64>;
 const FALL: V = V::new(0.0, 0.0, -9.81);
 /// Incline of the rollers.
 const NORMAL: V = V::new(1.0, 0.3, 2.0);
-const MOVING: [Scheme; 6] = [
+const MOVING: [Scheme; 7] = [
     Scheme::SymplecticEuler,
     Scheme::Midpoint,
     Scheme::Rk4,
     Scheme::ImplicitEuler,
     Scheme::Bdf2,
     Scheme::Newmark { beta: 0.25, gamma: 0.5 },
+    Scheme::GeneralisedAlpha { spectral_radius: 0.8 },
 ];
 
 fn solver(iterations: u32, tolerance: f64) -> BodySettings {

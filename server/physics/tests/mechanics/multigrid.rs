@@ -138,7 +138,12 @@ fn run(method: Method, scheme: Scheme, stiffness: f64) -> (Vec<Vector3<f64>>, u3
 
 #[test]
 fn motion_is_that_of_other_solvers_through_cuts_and_springs() {
-    for scheme in [Scheme::ImplicitEuler, Scheme::Bdf2, Scheme::Newmark { beta: 0.25, gamma: 0.5 }] {
+    for scheme in [
+        Scheme::ImplicitEuler,
+        Scheme::Bdf2,
+        Scheme::Newmark { beta: 0.25, gamma: 0.5 },
+        Scheme::GeneralisedAlpha { spectral_radius: 0.8 },
+    ] {
         for stiffness in [1e4, 3e6, 1e8] {
             let [pcg, cycles, mg_pcg] =
                 [Method::Pcg, Method::Multigrid, Method::MgPcg].map(|method| run(method, scheme, stiffness));

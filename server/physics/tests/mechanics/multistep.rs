@@ -13,6 +13,7 @@ use scindo_physics::mesh::{BoxPattern, box_mesh};
 use crate::{DOWN, SOFT, apart, cube, hold_left, settings};
 
 const NEWMARK: Scheme = Scheme::AVERAGE_ACCELERATION;
+const ALPHA: Scheme = Scheme::GeneralisedAlpha { spectral_radius: 0.8 };
 
 /// A beam that is held at its left end, in free vibration under its weight.
 fn beam(law: Law, rayleigh: Rayleigh, settings: BodySettings) -> Body {
@@ -29,7 +30,7 @@ fn with(scheme: Scheme, arithmetic: Arithmetic, tolerance: f64) -> BodySettings 
 #[test]
 fn both_paths_move_alike() {
     let damped = Rayleigh { mass_1_s: 0.5, stiffness_s: 0.002 };
-    for scheme in [Scheme::Bdf2, NEWMARK] {
+    for scheme in [Scheme::Bdf2, NEWMARK, ALPHA] {
         for law in [Law::Linear, Law::Corotational] {
             for rayleigh in [Rayleigh::default(), damped] {
                 let mut fast = beam(law, rayleigh, with(scheme, Arithmetic::Single, 1e-6));
@@ -48,6 +49,36 @@ fn both_paths_move_alike() {
                 let bound = if law == Law::Linear { 1e-4 } else { 1e-2 };
                 assert!(apart < bound * sag, "{scheme:?} {law:?} {rayleigh:?}: {apart} m of {sag} m");
             }
+        }
+    }
+}
+
+/// Generalised-α leaves of the fastest oscillations what its spectral radius says, and damps slow ones hardly.
+#[test]
+fn generalised_alpha_damps_fast_oscillations_alone() {
+    for arithmetic in [Arithmetic::Single, Arithmetic::Double] {
+        for spectral_radius in [1.0, 0.8, 0.5] {
+            let scheme = Scheme::GeneralisedAlpha { spectral_radius };
+            let left = |h: f64, steps: u32| {
+                let mut body = beam(Law::Linear, Rayleigh::default(), with(scheme, arithmetic, 1e-7));
+                let drawn = |x: &Vector3<f64>| x + Vector3::new(1e-3 * x.x, 0.0, 0.0);
+                let x: Vec<Vector3<f64>> = body.rest_positions().iter().map(drawn).collect();
+                let v = vec![Vector3::zeros(); x.len()];
+                body.set_state(&x, &v).unwrap();
+                let before = body.elastic_energy();
+                for _ in 0..steps {
+                    assert_eq!(body.step(h, Vector3::zeros(), &[]).outcome, Outcome::Advanced);
+                }
+                (body.kinetic_energy() + body.elastic_energy()) / before
+            };
+            // Steps of a hundred periods, after the first ones have settled: ρ² of the energy is left by each.
+            let rate = (left(2.0, 24) / left(2.0, 12)).powf(1.0 / 12.0);
+            assert!(
+                (rate - spectral_radius.powi(2)).abs() < 0.05,
+                "{arithmetic:?} {spectral_radius}: {rate}"
+            );
+            let slow = left(1e-4, 100);
+            assert!(slow > 0.97 && slow < 1.001, "{arithmetic:?} {spectral_radius}: {slow}");
         }
     }
 }

@@ -263,7 +263,12 @@ fn the_kernels_step_like_the_discrete_model() {
     let edge = |z: f64| [Vector3::new(0.2, -0.1, z), Vector3::new(0.24, 0.3, z)];
     let blade = BladeSweep { segments: vec![edge(0.3), edge(0.07)] };
     for law in [Law::Linear, Law::Corotational] {
-        for scheme in [Scheme::ImplicitEuler, Scheme::Bdf2, Scheme::Newmark { beta: 0.25, gamma: 0.5 }] {
+        for scheme in [
+            Scheme::ImplicitEuler,
+            Scheme::Bdf2,
+            Scheme::Newmark { beta: 0.25, gamma: 0.5 },
+            Scheme::GeneralisedAlpha { spectral_radius: 0.8 },
+        ] {
             let moved = [None, Some(Arithmetic::Double)].map(|arithmetic| {
                 let solver = PcgSettings { iterations: 2000, tolerance: 1e-6 };
                 let settings = BodySettings { solver, scheme, arithmetic, ..BodySettings::default() };

@@ -17,11 +17,12 @@ const ELEMENTS: [(&str, ElementKind, bool); 5] = [
     ("tet10", ElementKind::Tet10, false),
     ("hex8, other boxes", ElementKind::Hex8, false),
 ];
-const SCHEMES: [(&str, Scheme); 7] = [
+const SCHEMES: [(&str, Scheme); 8] = [
     ("static", Scheme::Static),
     ("implicit-euler", Scheme::ImplicitEuler),
     ("bdf2", Scheme::Bdf2),
     ("newmark", Scheme::AVERAGE_ACCELERATION),
+    ("generalised-alpha", Scheme::GeneralisedAlpha { spectral_radius: 0.8 }),
     ("symplectic-euler", Scheme::SymplecticEuler),
     ("midpoint", Scheme::Midpoint),
     ("rk4", Scheme::Rk4),

@@ -206,7 +206,12 @@ fn a_cut_thinner_than_the_composite_elements_parts_the_body() {
 
 #[test]
 fn free_bodies_fall_and_keep_their_momentum() {
-    for scheme in [Scheme::ImplicitEuler, Scheme::Bdf2, Scheme::Newmark { beta: 0.25, gamma: 0.5 }] {
+    for scheme in [
+        Scheme::ImplicitEuler,
+        Scheme::Bdf2,
+        Scheme::Newmark { beta: 0.25, gamma: 0.5 },
+        Scheme::GeneralisedAlpha { spectral_radius: 0.8 },
+    ] {
         for level in [1, 2] {
             let made = Made { cells: 12, levels: 2, law: Law::Corotational, ..UNIT };
             let mut body = body(made, at_level(level, scheme, 1e-4));

@@ -131,7 +131,7 @@ fn double_precision(case: &Case) -> Vec<String> {
 fn order(integrator: &str) -> i32 {
     match integrator {
         "rk4" => 4,
-        "bdf2" | "newmark" | "midpoint" => 2,
+        "bdf2" | "newmark" | "generalised-alpha" | "midpoint" => 2,
         _ => 1,
     }
 }

@@ -56,7 +56,7 @@ pub fn work(case: &Case, configuration: &Configuration) -> f64 {
         _ => 1.0,
     };
     let integrator = match configuration.label(Factor::Integrator) {
-        "bdf2" | "newmark" => 4.0,
+        "bdf2" | "newmark" | "generalised-alpha" => 4.0,
         _ => 1.0,
     };
     let law = match configuration.label(Factor::Law) {

@@ -63,7 +63,7 @@ pub(super) fn axes(
     let mut axes = vec![words(of, Factor::Law, "law", "corotational", &LAWS), elements(of)];
     axes.extend(meshes(of, quick, cells_wanted));
     if !is_static {
-        let mut all = vec!["implicit-euler", "bdf2", "newmark"];
+        let mut all = vec!["implicit-euler", "bdf2", "newmark", "generalised-alpha"];
         if explicit {
             all.extend(["symplectic-euler", "midpoint", "rk4"]);
         }
@@ -197,6 +197,6 @@ pub(super) fn blocks(axes: &[Axis], of: Subject<'_>) -> Vec<Block> {
         Block(vec![meshes(), (Factor::Element, elements)]),
         Block(vec![meshes(), (Factor::Tolerance, some(&["1e-2", "1e-4"]))]),
         Block(vec![meshes(), (Factor::Law, some(&["linear"]))]),
-        Block(vec![meshes(), (Factor::Integrator, some(&["bdf2", "newmark"]))]),
+        Block(vec![meshes(), (Factor::Integrator, some(&["bdf2", "newmark", "generalised-alpha"]))]),
     ]
 }

@@ -46,6 +46,8 @@ pub struct Mechanics {
     pub sub_steps: u32,
     /// Most stable steps that an explicit integrator may divide a step into.
     pub most_stable_steps: Option<u32>,
+    /// What a step of generalised-α leaves of the fastest oscillations.
+    pub spectral_radius: Option<f64>,
     /// Parameters of Newmark's method, used by it alone.
     pub newmark: Newmark,
     /// Mass matrix.
@@ -81,6 +83,9 @@ pub struct Mechanics {
     /// What becomes of parts without a held node.
     pub loose: RawLoose,
 }
+
+/// What generalised-α leaves of the fastest oscillations unless the scene says otherwise.
+const SPECTRAL_RADIUS: f64 = 0.8;
 
 /// Parameters of Newmark's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -167,6 +172,9 @@ impl Mechanics {
                 RawIntegrator::Rk4 => Scheme::Rk4,
                 RawIntegrator::ImplicitEuler => Scheme::ImplicitEuler,
                 RawIntegrator::Bdf2 => Scheme::Bdf2,
+                RawIntegrator::GeneralisedAlpha => Scheme::GeneralisedAlpha {
+                    spectral_radius: self.spectral_radius.unwrap_or(SPECTRAL_RADIUS),
+                },
                 RawIntegrator::Newmark => {
                     Scheme::Newmark { beta: self.newmark.beta, gamma: self.newmark.gamma }
                 }

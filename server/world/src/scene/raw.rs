@@ -180,6 +180,10 @@ pub struct RawBody {
     /// Parameters of `integrator = "newmark"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub newmark: Option<RawNewmark>,
+    /// What a step of `integrator = "generalised-alpha"` leaves of the fastest oscillations. Default: 0.8.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-next" = "0.8; 1 damps nothing, 0 removes what a step does not resolve"))]
+    pub spectral_radius: Option<f64>,
     /// Mass matrix. `lumped` integrates the shape functions over each piece; with explicit integrators on tet4 it is
     /// `menouillard`.
     #[serde(default)]

@@ -58,6 +58,8 @@ fn soft(law: Law) -> Material {
     material(law, 2e4, 0.3, 1000.0)
 }
 
+const ALPHA: Scheme = Scheme::GeneralisedAlpha { spectral_radius: 0.8 };
+
 #[test]
 fn explicit_schemes_have_their_order() {
     for law in [Law::Corotational, Law::NeoHookean] {
@@ -74,6 +76,7 @@ fn implicit_schemes_have_their_order() {
         order(soft(law), Scheme::ImplicitEuler, MassKind::Lumped, [100, 200, 400], 1.0);
         order(soft(law), Scheme::Bdf2, MassKind::Lumped, [50, 100, 200], 2.0);
         order(soft(law), Scheme::AVERAGE_ACCELERATION, MassKind::Lumped, [50, 100, 200], 2.0);
+        order(soft(law), ALPHA, MassKind::Lumped, [50, 100, 200], 2.0);
     }
 }
 
@@ -83,6 +86,7 @@ fn orders_hold_with_consistent_mass_and_damping() {
         Material { rayleigh: Rayleigh { mass_1_s: 0.5, stiffness_s: 1e-3 }, ..soft(Law::Corotational) };
     order(damped, Scheme::Rk4, MassKind::Consistent, [25, 50, 100], 4.0);
     order(damped, Scheme::AVERAGE_ACCELERATION, MassKind::Consistent, [50, 100, 200], 2.0);
+    order(damped, ALPHA, MassKind::Consistent, [50, 100, 200], 2.0);
     order(damped, Scheme::Bdf2, MassKind::Lumped, [50, 100, 200], 2.0);
 }
 

@@ -24,6 +24,7 @@ impl Check<'_> {
             integrator: body.integrator,
             sub_steps: body.sub_steps,
             most_stable_steps: body.most_stable_steps,
+            spectral_radius: body.spectral_radius,
             newmark: Newmark { beta: newmark.beta, gamma: newmark.gamma },
             mass: body.mass,
             locking: body.locking,
@@ -68,6 +69,12 @@ impl Check<'_> {
                 m.integrator.is_explicit(),
                 word(&m.integrator),
                 "an implicit integrator",
+                "write integrator = \"bdf2\"",
+            ),
+            (
+                m.integrator == RawIntegrator::GeneralisedAlpha,
+                word(&m.integrator),
+                "forces at the end of a step",
                 "write integrator = \"bdf2\"",
             ),
             (
@@ -194,6 +201,14 @@ impl Check<'_> {
             let what =
                 format!("`newmark` only goes with integrator newmark, found {}", word(&body.integrator));
             self.conflict(format!("{at}.newmark"), what, "remove it or write integrator = \"newmark\"");
+        }
+        if body.spectral_radius.is_some() && body.integrator != RawIntegrator::GeneralisedAlpha {
+            let what = format!(
+                "`spectral_radius` only goes with integrator generalised-alpha, found {}",
+                word(&body.integrator)
+            );
+            let next = "remove it or write integrator = \"generalised-alpha\"";
+            self.conflict(format!("{at}.spectral_radius"), what, next);
         }
         if body.most_stable_steps.is_some() && !body.integrator.is_explicit() {
             let what = format!(

@@ -70,6 +70,8 @@ pub enum RawIntegrator {
     Bdf2,
     /// Second order, implicit, no damping with the default parameters.
     Newmark,
+    /// Second order, implicit, damps fast oscillations alone.
+    GeneralisedAlpha,
 }
 
 impl RawIntegrator {

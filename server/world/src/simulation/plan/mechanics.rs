@@ -83,6 +83,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         RawIntegrator::Rk4 => "Runge-Kutta 4".into(),
         RawIntegrator::ImplicitEuler => "implicit Euler".into(),
         RawIntegrator::Bdf2 => "BDF2".into(),
+        RawIntegrator::GeneralisedAlpha => "generalised-alpha".into(),
         RawIntegrator::Newmark => format!("Newmark {} {}", m.newmark.beta, m.newmark.gamma),
     };
     let steps = if m.sub_steps > 1 { format!(" in {} sub-steps", m.sub_steps) } else { String::new() };
