@@ -9,9 +9,10 @@ pub(crate) struct Ledger {
     end: f64,
 }
 
-/// Relative gain of energy at which a guard steps in: for schemes that should conserve energy, and for
-/// implicit Euler, which should lose some.
+/// Relative gain of energy at which a guard steps in: for schemes that should conserve energy, for generalised-α, which
+/// conserves none in single steps, and for implicit Euler, which should lose some.
 pub(crate) const GAIN_CONSERVING: f64 = 0.01;
+pub(crate) const GAIN_ALPHA: f64 = 0.5;
 pub(crate) const GAIN_DISSIPATING: f64 = 1e-4;
 
 impl Ledger {

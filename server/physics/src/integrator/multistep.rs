@@ -9,7 +9,7 @@ use scindo_matter::octree::Restriction;
 use scindo_matter::storage::reserve::resize_reserving;
 use scindo_matter::team::{Team, blocks};
 
-use super::guard::{GAIN_CONSERVING, GAIN_DISSIPATING, LARGEST_TURN, Ledger};
+use super::guard::{GAIN_ALPHA, GAIN_CONSERVING, GAIN_DISSIPATING, LARGEST_TURN, Ledger};
 use super::history::History;
 use super::increment::{Increment, bdf2_history, newmark_history};
 use super::notice::Notice;
@@ -262,7 +262,11 @@ impl Multistep {
         scheme: Scheme,
         (driven, may_repeat): (bool, bool),
     ) -> Option<f64> {
-        let gain = if scheme == Scheme::ImplicitEuler { GAIN_DISSIPATING } else { GAIN_CONSERVING };
+        let gain = match scheme {
+            Scheme::ImplicitEuler => GAIN_DISSIPATING,
+            Scheme::GeneralisedAlpha { .. } => GAIN_ALPHA,
+            _ => GAIN_CONSERVING,
+        };
         let excess = if driven { None } else { self.ledger.excess(H, gain * size_j) };
         if excess.is_none() || !may_repeat {
             self.stored_j = Some(stored_j);

@@ -41,6 +41,8 @@ fn both_paths_move_alike() {
                     assert!(reports.iter().all(|r| r.outcome == Outcome::Advanced), "{reports:?}");
                     assert!(reports[0].residual <= 1e-6 && reports[0].algebraic_error >= 0.0);
                     let euler = matches!(reports[0].notice, Some(Notice::Started));
+                    let kept = reports.iter().all(|r| euler || r.scheme == scheme);
+                    assert!(kept, "step {step}: {reports:?}");
                     assert_eq!(euler, scheme == Scheme::Bdf2 && step == 0, "{:?}", reports[0].notice);
                 }
                 let (sag, apart) =
@@ -71,12 +73,11 @@ fn generalised_alpha_damps_fast_oscillations_alone() {
                 }
                 (body.kinetic_energy() + body.elastic_energy()) / before
             };
-            // Steps of a hundred periods, after the first ones have settled: ρ² of the energy is left by each.
+            // Steps of many periods leave ρ² of the energy each, and a little more at first, because both roots are ρ.
             let rate = (left(2.0, 24) / left(2.0, 12)).powf(1.0 / 12.0);
-            assert!(
-                (rate - spectral_radius.powi(2)).abs() < 0.05,
-                "{arithmetic:?} {spectral_radius}: {rate}"
-            );
+            let expected = spectral_radius.powi(2);
+            let expects = rate > 0.98 * expected && rate < 1.14 * expected;
+            assert!(expects, "{arithmetic:?} {spectral_radius}: {rate}");
             let slow = left(1e-4, 100);
             assert!(slow > 0.97 && slow < 1.001, "{arithmetic:?} {spectral_radius}: {slow}");
         }

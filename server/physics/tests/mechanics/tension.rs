@@ -1,7 +1,9 @@
 //! Stretched bodies come to rest where they balance, whatever the step.
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Ablation, Arithmetic, Body, BodySettings, Notice, Outcome, PcgSettings, Scheme};
+use scindo_physics::body::{
+    Ablation, Arithmetic, Body, BodySettings, Method, Notice, Outcome, PcgSettings, Scheme,
+};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
@@ -123,6 +125,16 @@ fn a_stretched_strip_of_cells_rests_where_it_balances() {
             let body = strip_of_cells(tissue(1e4, damping), scheme(Scheme::ImplicitEuler));
             assert_rests(&stretched(body, stretch, 0.02), sag_mm);
         }
+    }
+}
+
+/// Cells that are merged for the simulation carry the twists of the fine ones.
+#[test]
+fn a_simulated_level_rests_alike_in_steps_of_any_length() {
+    let settings = BodySettings { simulate_level: 1, method: Method::MgPcg, ..scheme(Scheme::ImplicitEuler) };
+    for stretch in [0.1, 0.5] {
+        let ends = [0.01, 0.04].map(|h| stretched(strip_of_cells(tissue(1e4, 0.02), settings), stretch, h));
+        ends.iter().for_each(|end| assert_rests(end, ends[0].sag_mm));
     }
 }
 
