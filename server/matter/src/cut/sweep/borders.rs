@@ -1,9 +1,9 @@
 //! Borders of earlier sweeps. A sweep that shares a part of one goes on with that cut.
 //!
 //! A sweep that ends inside an element leaves it closed. If another incision begins there, each of the two has
-//! crossed a part of the element's edges, and neither has cut it apart. Incisions that share a part of their borders are
-//! therefore parts of one cut, in whatever order and direction they were swept: each takes over what earlier parts have
-//! crossed and not cut in the elements that it meets itself.
+//! crossed a part of the element's edges, and neither has cut it apart. Incisions that share a part of their borders, or
+//! overlap in a plane, are therefore parts of one cut, in whatever order and direction they were swept: each takes over
+//! what earlier parts have crossed and not cut in the elements that it meets itself.
 //!
 //! A border is a line of the material. It counts where it was given and where the tissue has carried it since. In
 //! the first case the sweep is extended to where the border is now.
@@ -69,6 +69,8 @@ struct Line {
     incision: u32,
     /// Whether further sweeps of the incision begin there.
     is_last: bool,
+    /// Direction into its sweep where it was given.
+    inwards: Vector3<f64>,
     /// Where it was given [m], and the material that was there, in order along it.
     points: Vec<(Vector3<f64>, MaterialPoint)>,
 }
@@ -105,8 +107,14 @@ pub fn edges(front: Option<&Front>, blade: &BladeSweep, x: &[Vector3<f64>]) -> V
 }
 
 impl Borders {
-    /// What a sweep of `incision` with these edges joins, with the copies at `x` [m].
-    pub fn join(&mut self, edges: &[Edge], incision: u32, x: &[Vector3<f64>], reach: Reach) -> Joined {
+    /// What a sweep of `incision` with these edges and `triangles` joins, with the copies at `x` [m].
+    pub fn join(
+        &mut self,
+        (edges, swept): (&[Edge], &[SweepTriangle]),
+        incision: u32,
+        x: &[Vector3<f64>],
+        reach: Reach,
+    ) -> Joined {
         let drift_m = MAX_DRIFT * reach.cell_m;
         let [low, high] = bounds(edges.iter().flat_map(|edge| &edge.ends));
         let (low, high) = (low.add_scalar(-drift_m), high.add_scalar(drift_m));
@@ -120,10 +128,12 @@ impl Borders {
             }
             near.insert(line.incision);
             let given: Vec<Vector3<f64>> = line.points.iter().map(|(given, _)| *given).collect();
+            let mut joins = false;
             for edge in edges {
-                if edge.joins([&given, &now], reach, &mut triangles) {
-                    joined.insert(line.incision);
-                }
+                joins |= edge.joins([&given, &now], reach, &mut triangles);
+            }
+            if joins || line.is_overlapped([&given, &now], swept, reach, &mut triangles) {
+                joined.insert(line.incision);
             }
         }
         let cut = self.cut_of(incision);
@@ -150,7 +160,8 @@ impl Borders {
             let [from, to] = edge.ends;
             let points = line_in_tissue(&edge.ends, &near(&[from.inf(&to), from.sup(&to)]), x);
             if points.len() > 1 {
-                self.lines.push_back(Line { incision, is_last: edge.is_last, points });
+                let (is_last, inwards) = (edge.is_last, unit(edge.inner - edge.foot(&edge.inner)));
+                self.lines.push_back(Line { incision, is_last, inwards, points });
             }
         }
         let spare = self.lines.len().saturating_sub(MAX_BORDERS);
@@ -192,6 +203,49 @@ impl Line {
     fn now(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         self.points.iter().map(|(_, point)| point.position(x)).collect()
     }
+
+    /// Whether a sweep in the same plane passes over a part of it, by where it was `given` or by where it is `now` [m]: the
+    /// two overlap there. Adds the triangles between the two places.
+    fn is_overlapped(
+        &self,
+        [given, now]: [&[Vector3<f64>]; 2],
+        swept: &[SweepTriangle],
+        reach: Reach,
+        triangles: &mut Vec<SweepTriangle>,
+    ) -> bool {
+        let tolerance_m = TOLERANCE * reach.cell_m;
+        let lies_in =
+            |p: &Vector3<f64>| swept.iter().any(|triangle| holds(triangle, p, self.inwards, tolerance_m));
+        for line in [given, now] {
+            let covered: Vec<usize> =
+                (1..line.len()).filter(|&k| lies_in(&line[k - 1].lerp(&line[k], 0.5))).collect();
+            let length =
+                |line: &[Vector3<f64>]| line.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum::<f64>();
+            let covered_m: f64 = covered.iter().map(|&k| length(&line[k - 1..=k])).sum();
+            if covered_m <= tolerance_m.min(0.5 * length(line)) {
+                continue;
+            }
+            for k in covered {
+                let [a, b, c, d] = [given[k - 1], now[k - 1], now[k], given[k]];
+                if (b - a).norm().max((c - d).norm()) > OVERREACH * (d - a).norm() {
+                    triangles.extend(SweepTriangle::new(a, b, c));
+                    triangles.extend(SweepTriangle::new(a, c, d));
+                }
+            }
+            return true;
+        }
+        false
+    }
+}
+
+/// Whether a point [m] lies in a triangle that has the direction `along`, within a tolerance [m].
+fn holds(triangle: &SweepTriangle, p: &Vector3<f64>, along: Vector3<f64>, tolerance_m: f64) -> bool {
+    let [a, b, c] = triangle.corners;
+    let n = (b - a).cross(&(c - a)) / triangle.double_area;
+    let is_inside = |[from, to]: [Vector3<f64>; 2]| n.cross(&(to - from)).dot(&(p - from)) >= 0.0;
+    n.dot(&(p - a)).abs() <= tolerance_m
+        && n.dot(&along).abs() <= MAX_SINE
+        && [[a, b], [b, c], [c, a]].into_iter().all(is_inside)
 }
 
 impl Edge {

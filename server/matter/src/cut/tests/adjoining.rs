@@ -49,6 +49,22 @@ fn parts_of_a_cut_open_what_the_whole_does() {
     }
 }
 
+/// Strips whose ends overlap, as by a blade that is set on again behind where it was taken off.
+#[test]
+fn parts_that_overlap_open_what_the_whole_does() {
+    for slope in [0.0, 0.13] {
+        let whole = cut(&strips(1, slope)).topology();
+        for (n, overlap) in [(2, 0.01), (2, 0.15), (4, 0.02), (8, 0.05)] {
+            let at = |k: usize| -0.1 + 0.73 * k as f64 / n as f64;
+            let parts: Vec<Vec<Segment>> =
+                (0..n).map(|k| patch([at(k) - overlap, -0.1], [at(k + 1), 1.1], slope)).collect();
+            assert_eq!(cut(&parts).topology(), whole, "{n} parts, slope {slope}, overlap {overlap}");
+            let back: Vec<Vec<Segment>> = parts.iter().rev().cloned().collect();
+            assert_eq!(cut(&back).topology(), whole, "{n} parts, the last first, overlap {overlap}");
+        }
+    }
+}
+
 /// Three through cuts, of which the third goes on across the first: they cut a triangular prism out, and two corners
 /// beside the crossing stay on.
 #[test]

@@ -207,7 +207,7 @@ impl OctreeSpace {
         let back_m = BEHIND * cell_m;
         let mut triangles = sweep_from_behind(front, blade, x, back_m);
         let edges = border_edges(front, blade, x);
-        let mut joined = self.borders.join(&edges, incision, x, Reach { cell_m, back_m });
+        let mut joined = self.borders.join((&edges, &triangles), incision, x, Reach { cell_m, back_m });
         triangles.append(&mut joined.triangles);
         let swept = swept_box(&triangles);
         let leaves = self.leaves_near(&vertices, &swept);
