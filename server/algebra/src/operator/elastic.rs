@@ -381,6 +381,10 @@ impl Stiffness for Elastic {
         self.choice = choice;
     }
 
+    fn is_twisted(&self) -> bool {
+        self.chunks.iter().any(Chunk::is_twisted)
+    }
+
     fn choice(&self) -> OperatorChoice {
         self.choice
     }

@@ -120,6 +120,11 @@ pub trait Stiffness: Any + Debug + Send + Sync {
     /// Second half: diagonal blocks of s K̂ of the copies of block number `block`.
     fn diagonals(&self, block: usize, diagonal: &mut [Block6]);
 
+    /// Whether K̂ contains twists anywhere.
+    fn is_twisted(&self) -> bool {
+        false
+    }
+
     /// Rises with every change of the stiffness. Updates with the same version have the same diagonal blocks.
     fn version(&self) -> u64;
 

@@ -262,10 +262,11 @@ impl LinearStep {
         self.descent.begin();
         for number in 0..inputs.solves.max(1) {
             let inverted = self.update_operator(team, elastic, state, number == 0, inputs);
-            // Counted where the step begins, not on the way to an equilibrium.
-            if number == 0 {
+            // Counted where the step begins, not on the way to an equilibrium; and where it ends if that is looked at.
+            if number == 0 || inputs.moves() {
                 inverted_pieces = inverted;
             }
+            self.equations.aim(elastic, inputs);
             let known = solve.iterations;
             self.improve(team, (elastic, inputs), state, number == 0, &mut solve);
             solves += 1;
@@ -589,7 +590,7 @@ impl LinearStep {
         }
         if let Some(level) = simulated {
             let (exact, fixed) = (!inputs.material.law.rotates(), inputs.step.fixed);
-            let from = (norm, self.reference, inputs.solver, self.method);
+            let from = (norm, self.reference, self.equations.until(inputs), self.method);
             return level.solve(team, (&mut A, exact), fixed, delta, from);
         }
         if pass == 0

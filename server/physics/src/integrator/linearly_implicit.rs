@@ -137,7 +137,10 @@ impl LinearlyImplicit {
                 _ => self.solves,
             };
             let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
-            let inputs = LinearInputs { step: *inputs, mass_f32, material, solver: *pcg, inertia, solves };
+            let conserves = scheme.is_newmark() && material.law.rotates() && !self.limited;
+            let (step_inputs, solver) = (*inputs, *pcg);
+            let inputs =
+                LinearInputs { step: step_inputs, mass_f32, material, solver, inertia, solves, conserves };
             let outcome = step.step(team, &mut **stiffness, state, &inputs, spring_forces);
             let StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, work_j, .. } =
                 outcome;
@@ -272,7 +275,9 @@ impl StepSolver for LinearlyImplicit {
     ) {
         let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
         let inertia = Inertia::Euler;
-        let inputs = LinearInputs { step: *inputs, mass_f32, material, solver: *pcg, inertia, solves: 1 };
+        let (solves, conserves) = (1, false);
+        let inputs =
+            LinearInputs { step: *inputs, mass_f32, material, solver: *pcg, inertia, solves, conserves };
         step.accelerate(team, &mut **stiffness, state, &inputs, acceleration);
     }
 
@@ -380,6 +385,7 @@ impl StepSolver for LinearlyImplicit {
             solver: *pcg,
             inertia: Inertia::Euler,
             solves: 1,
+            conserves: false,
         };
         Some(Member {
             step,

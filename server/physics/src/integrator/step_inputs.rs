@@ -78,6 +78,8 @@ pub struct LinearInputs<'a> {
     /// Linear solves of the step, at least 1; each starts from the result of the one before. An
     /// equilibrium ends earlier once it is reached.
     pub solves: u32,
+    /// Whether nothing but the material damps what the step leaves of its equations.
+    pub conserves: bool,
 }
 
 /// Where a solve of a step begins.

@@ -318,6 +318,10 @@ impl Stiffness for CellStiffness {
     /// Nothing: there is only [`OperatorChoice::MatrixFree`].
     fn set_choice(&mut self, _: OperatorChoice) {}
 
+    fn is_twisted(&self) -> bool {
+        self.operator.chunks.iter().any(|chunk| chunk.twisted)
+    }
+
     fn choice(&self) -> OperatorChoice {
         OperatorChoice::MatrixFree
     }

@@ -6,7 +6,7 @@
 //! # Source
 //! Eisenstat, Walker 1996, "Choosing the forcing terms in an inexact Newton method", choice 1.
 
-use scindo_algebra::operator::block_of;
+use scindo_algebra::operator::{Stiffness, block_of};
 use scindo_algebra::solver::{LinearReport, PcgSettings, StopReason};
 use scindo_matter::team::{Team, blocks};
 
@@ -19,6 +19,10 @@ const ENOUGH: f64 = 10.0;
 /// Parts of the residual that [rounding may leave](LinearStep::note_rounding): one that is nothing else, and one below which
 /// a solve that does not halve it shows that it is.
 const ROUNDED: [f64; 2] = [0.4, 4.0];
+
+/// Part of the tolerance to which the equations of Newmark's method and its generalisation are solved in a body under
+/// tension. The residual hardly tells of its softest motions, and nothing damps what is left of these.
+const CONSERVED: f64 = 3e-3;
 
 /// Residuals of the equations in the solves of a step, relative to that of the first.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
@@ -34,6 +38,8 @@ pub(super) struct StepEquations {
     rounded: f64,
     /// The one at which the equations hold.
     hold_at: f64,
+    /// The one that a linear system may leave.
+    tolerance: f64,
     /// Whether the tangent of a law that is nonlinear in the stretch is made positive semidefinite in this step.
     pub definite: bool,
 }
@@ -42,6 +48,12 @@ impl StepEquations {
     /// Begins a step.
     pub(super) fn begin(&mut self) {
         *self = Self { least: f64::INFINITY, before: f64::INFINITY, ..Self::default() };
+    }
+
+    /// Says how well a solve with this stiffness has to be made.
+    pub(super) fn aim(&mut self, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
+        let soft = inputs.conserves && (elastic.is_twisted() || inputs.is_nonlinear());
+        self.tolerance = inputs.solver.tolerance * if soft { CONSERVED } else { 1.0 };
     }
 
     /// Makes the tangent positive semidefinite for the rest of the step. Returns `false` if it is.
@@ -70,7 +82,7 @@ impl StepEquations {
         let (times, nothing_else) = if inputs.is_nonlinear() { (1.0, nothing_else) } else { (ENOUGH, 0.0) };
         let rounded = if began <= 0.5 * self.least { nothing_else } else { at_most };
         self.began = began;
-        self.hold_at = rounded.max(times * inputs.solver.tolerance);
+        self.hold_at = rounded.max(times * self.tolerance);
         if !first && began <= self.hold_at {
             return Some(LinearReport::default());
         }
@@ -84,11 +96,11 @@ impl StepEquations {
     /// When the linear system is solved: no solve of several has to be better than the tangent of the last one was.
     pub(super) fn until(&self, inputs: &LinearInputs<'_>) -> PcgSettings {
         if !inputs.is_nonlinear() {
-            return inputs.solver;
+            return PcgSettings { tolerance: self.tolerance, ..inputs.solver };
         }
         let bent = (self.began - self.foreseen).abs() / self.before;
         let part = if self.before.is_finite() { FORCING.min(bent) } else { FORCING };
-        PcgSettings { tolerance: (part * self.began).max(0.5 * inputs.solver.tolerance), ..inputs.solver }
+        PcgSettings { tolerance: (part * self.began).max(0.5 * self.tolerance), ..inputs.solver }
     }
 
     /// Notes the residual that a linear system left.
