@@ -411,7 +411,7 @@ impl SimBody {
 }
 
 /// When each of `parts` equal parts of a step of `h` [s] ends that ends at `time_s` [s], and how long it is [s].
-pub(crate) fn sub_steps(parts: u32, (time_s, h): (f64, f64)) -> impl Iterator<Item = (f64, f64)> {
+fn sub_steps(parts: u32, (time_s, h): (f64, f64)) -> impl Iterator<Item = (f64, f64)> {
     let part_s = h / f64::from(parts);
     (0..parts).rev().map(move |left| (time_s - f64::from(left) * part_s, part_s))
 }

@@ -169,7 +169,7 @@ pub struct RawBody {
     #[serde(default)]
     pub integrator: RawIntegrator,
     /// Equal steps that the body makes in each step of the world. A stiff or fast body can take short steps beside
-    /// others that take long ones. Bodies that touch take as many as the one with the most.
+    /// others that take long ones. Not for bodies that touch each other or themselves.
     #[serde(default = "one_step")]
     #[schemars(range(min = 1, max = 64), extend("x-next" = "2 halves the error that BDF2 leaves by four, and doubles the cost"))]
     pub sub_steps: u32,

@@ -1,12 +1,12 @@
 //! Bodies deform: side by side, or together where they touch.
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Body, Group, Outcome, PointSpring, SolveReport};
+use scindo_physics::body::{Body, Group, PointSpring, SolveReport};
 use scindo_physics::team::blocks;
 use smallvec::SmallVec;
 
 use super::Simulation;
-use crate::body::{SimBody, sub_steps};
+use crate::body::SimBody;
 use crate::contact::Contacts;
 use crate::report::BodyReport;
 
@@ -89,30 +89,19 @@ fn together(
 ) {
     let _span = tracing::trace_span!("deform together", body = %bodies[first].id).entered();
     let is_in = |i: &usize| contacts.pairs().group_of(*i) == first;
-    let n = bodies.len();
-    let of = || (first..n).filter(is_in);
-    let parts = of().map(|i| bodies[i].sub_steps).max().unwrap_or(1);
-    let pairs = contacts.pairs().springs_of(first);
-    let mut whole: SmallVec<[SolveReport; USUAL]> = SmallVec::new();
-    for (end_s, h) in sub_steps(parts, (time_s, h)) {
-        let mut members: SmallVec<[&mut Body; USUAL]> = SmallVec::new();
-        let mut springs: SmallVec<[&[PointSpring]; USUAL]> = SmallVec::new();
-        for (i, body) in bodies.iter_mut().enumerate().filter(|(i, _)| is_in(i)) {
-            body.prescribe(end_s);
-            springs.push(contacts.springs(i));
-            members.push(&mut body.body);
-        }
-        let solved = group.step(&mut members, (h, gravity), &springs, pairs);
-        if whole.is_empty() {
-            whole.extend_from_slice(solved);
-        } else {
-            whole.iter_mut().zip(solved).for_each(|(whole, part)| *whole = whole.then(part));
-        }
-        if whole.iter().any(|solve| solve.outcome != Outcome::Advanced) {
-            break;
-        }
+    let mut members: SmallVec<[&mut Body; USUAL]> = SmallVec::new();
+    let mut springs: SmallVec<[&[PointSpring]; USUAL]> = SmallVec::new();
+    for (i, body) in bodies.iter_mut().enumerate().filter(|(i, _)| is_in(i)) {
+        body.prescribe(time_s);
+        springs.push(contacts.springs(i));
+        members.push(&mut body.body);
     }
-    for (i, solve) in of().zip(whole) {
+    let pairs = contacts.pairs().springs_of(first);
+    let solved = group.step(&mut members, (h, gravity), &springs, pairs);
+    let solved: SmallVec<[SolveReport; USUAL]> = solved.iter().copied().collect();
+    drop(members);
+    let of = (first..bodies.len()).filter(is_in);
+    for (i, solve) in of.zip(solved) {
         reports[i].solve = bodies[i].as_it_ended(solve);
     }
 }

@@ -304,7 +304,7 @@ fn no_mistake_that_can_be_seen_in_the_scene_is_silent() {
     let empty = said(directory.path(), "schema = 1\n", false);
     assert!(empty.contains("the scene has no body"), "{empty}");
     // With the two that need steps, and the one above.
-    assert_eq!(AT_ONCE.len() + IN_THE_FIRST_STEPS.len() + 1, 52);
+    assert_eq!(AT_ONCE.len() + IN_THE_FIRST_STEPS.len() + 1, 57);
 }
 
 #[test]

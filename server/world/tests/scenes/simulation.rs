@@ -72,33 +72,6 @@ fn sub_steps_are_shorter_steps() {
     }
 }
 
-/// Bodies that touch take as many sub-steps as one of them wants, and rest as without.
-#[test]
-fn bodies_that_touch_take_sub_steps_together() {
-    let stack = |sub_steps: u32| {
-        let block = |id: &str, from: f64, more: &str| {
-            format!(
-                "[[body]]\nid = \"{id}\"\nmesh = {{ box = {{ min_m = [0, 0, {from}], max_m = [0.1, 0.1, {}], cells = [3, 3, 3] }} }}\n\
-                 young_pa = 2e4\npoisson = 0.3\ndensity_kg_m3 = 1000\nrayleigh = {{ mass_1_s = 5, stiffness_s = 0.02 }}\n{more}",
-                from + 0.1
-            )
-        };
-        let fix = "[[body.fix]]\nwhere = { slab = { axis = \"z\", from = 0, to = 0 } }\n";
-        let text = format!(
-            "schema = 1\nworld = {{ gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }}\neffects = {{ body_collision = true }}\n{}{}",
-            block("lower", 0.0, fix),
-            block("upper", 0.1005, &format!("sub_steps = {sub_steps}\n"))
-        );
-        let mut sim = start(&text);
-        run(&mut sim, 200);
-        let top = sim.bodies()[1].body.positions().iter().map(|x| x.z).fold(0.0, f64::max);
-        assert!(sim.bodies().iter().all(|body| body.counts().rolled_back + body.counts().unbalanced == 0));
-        top
-    };
-    let [one, four] = [1, 4].map(stack);
-    assert!((one - four).abs() < 2e-4 && one > 0.18, "{one} {four}");
-}
-
 /// Wherever a plane lies and however far the body has moved, it parts the body; every method does.
 #[test]
 fn a_plane_cuts_a_moving_body_all_the_way_through() {

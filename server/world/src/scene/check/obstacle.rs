@@ -27,6 +27,8 @@ impl Check<'_> {
                         Some("an implicit integrator of motion")
                     } else if body.octree.is_some_and(|octree| octree.simulate_level > 0) {
                         Some("octree.simulate_level = 0")
+                    } else if mechanics.sub_steps > 1 {
+                        Some("sub_steps = 1")
                     } else if !mechanics.constitutive_law().is_hookean() {
                         Some("the law linear or corotational")
                     } else {
