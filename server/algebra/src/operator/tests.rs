@@ -514,8 +514,9 @@ fn pieces_with_the_same_copies_share_a_lane_until_a_cut_separates_them() {
             12 => (-0.1, 0.3, 0.3),
             _ => (0.015 * f64::from(k), 0.015 * f64::from(k) + 0.034, 0.04 + 0.03 * f64::from(k % 4)),
         };
-        let blade =
-            |y: f64| [Vector3::new(0.11 + 0.2 * y, y, 0.2 - depth), Vector3::new(0.11 + 0.2 * y, y, 0.3)];
+        // Those that overlap lie beside each other, so that none is a part of another one's cut.
+        let x = |y: f64| 0.11 + 0.2 * y + 0.004 * f64::from(k % 3);
+        let blade = |y: f64| [Vector3::new(x(y), y, 0.2 - depth), Vector3::new(x(y), y, 0.3)];
         let sweep = BladeSweep { segments: vec![blade(from), blade(to)] };
         let before = (elastic.rotations(), elastic.n_pieces());
         cut.sweep(&cut.rest_positions(), &sweep, k + 1).unwrap();

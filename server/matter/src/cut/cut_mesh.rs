@@ -383,7 +383,7 @@ impl CutMesh {
         let mut triangles = sweep_triangles(front, blade, x);
         let edges = edges(front, blade, x);
         let reach = Reach { cell_m: self.cell_m(), back_m: 0.0 };
-        let mut joined = self.borders.join((&edges, &triangles), incision, x, reach);
+        let mut joined = self.borders.join(&edges, &triangles, incision, x, reach);
         triangles.append(&mut joined.triangles);
         triangles.iter_mut().for_each(|triangle| triangle.exact = !self.inexact);
         let bounds = sweep_bounds(&triangles, blade);

@@ -78,8 +78,10 @@ impl ModelSolver {
         let Some(history) = multistep.extrapolate(team, before, (scheme, inputs.h)) else { return };
         match scheme {
             scheme if scheme.is_newmark() => {
+                // Where the equations hold: at the end of the step, or inside it.
+                let h = inputs.h * scheme.alpha().map_or(1.0, |alpha| 1.0 - alpha.alpha_f);
                 let known = before.x.iter().zip(&before.v);
-                state.x.iter_mut().zip(known).for_each(|(next, (x, v))| *next = x + inputs.h * v);
+                state.x.iter_mut().zip(known).for_each(|(next, (x, v))| *next = x + h * v);
             }
             _ => state.x.copy_from_slice(history.x_a),
         }

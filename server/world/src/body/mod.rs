@@ -140,7 +140,7 @@ impl SimBody {
         springs: &[PointSpring],
     ) -> SolveReport {
         let mut whole: Option<SolveReport> = None;
-        for (end_s, h) in sub_steps(self.sub_steps, (time_s, h)) {
+        for (end_s, h) in sub_steps(self.sub_steps, time_s, h) {
             self.prescribe(end_s);
             let part = self.body.step(h, gravity_m_s2, springs);
             whole = Some(whole.map_or(part, |whole| whole.then(&part)));
@@ -411,7 +411,7 @@ impl SimBody {
 }
 
 /// When each of `parts` equal parts of a step of `h` [s] ends that ends at `time_s` [s], and how long it is [s].
-fn sub_steps(parts: u32, (time_s, h): (f64, f64)) -> impl Iterator<Item = (f64, f64)> {
+fn sub_steps(parts: u32, time_s: f64, h: f64) -> impl Iterator<Item = (f64, f64)> {
     let part_s = h / f64::from(parts);
     (0..parts).rev().map(move |left| (time_s - f64::from(left) * part_s, part_s))
 }

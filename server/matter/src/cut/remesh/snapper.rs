@@ -164,7 +164,7 @@ impl Snapper {
         let mut triangles = sweep_triangles(front, blade, nodes.x);
         let edges = border_edges(front, blade, nodes.x);
         let reach = Reach { cell_m: mesh.cell_m(), back_m: 0.0 };
-        let mut joined = self.borders.join((&edges, &triangles), incision, nodes.x, reach);
+        let mut joined = self.borders.join(&edges, &triangles, incision, nodes.x, reach);
         triangles.append(&mut joined.triangles);
         self.joined = joined.incisions;
         let (near, examined) = mesh.pieces_near(nodes.x, &sweep_bounds(&triangles, blade));

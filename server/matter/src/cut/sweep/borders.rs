@@ -110,7 +110,8 @@ impl Borders {
     /// What a sweep of `incision` with these edges and `triangles` joins, with the copies at `x` [m].
     pub fn join(
         &mut self,
-        (edges, swept): (&[Edge], &[SweepTriangle]),
+        edges: &[Edge],
+        swept: &[SweepTriangle],
         incision: u32,
         x: &[Vector3<f64>],
         reach: Reach,
@@ -214,9 +215,10 @@ impl Line {
         triangles: &mut Vec<SweepTriangle>,
     ) -> bool {
         let tolerance_m = TOLERANCE * reach.cell_m;
-        let lies_in =
-            |p: &Vector3<f64>| swept.iter().any(|triangle| holds(triangle, p, self.inwards, tolerance_m));
         for line in [given, now] {
+            let directions = [self.inwards, unit(line[line.len() - 1] - line[0])];
+            let lies_in =
+                |p: &Vector3<f64>| swept.iter().any(|triangle| holds(triangle, p, directions, tolerance_m));
             let covered: Vec<usize> =
                 (1..line.len()).filter(|&k| lies_in(&line[k - 1].lerp(&line[k], 0.5))).collect();
             let length =
@@ -238,13 +240,18 @@ impl Line {
     }
 }
 
-/// Whether a point [m] lies in a triangle that has the direction `along`, within a tolerance [m].
-fn holds(triangle: &SweepTriangle, p: &Vector3<f64>, along: Vector3<f64>, tolerance_m: f64) -> bool {
+/// Whether a point [m] lies in a triangle that has these directions, within a tolerance [m].
+fn holds(
+    triangle: &SweepTriangle,
+    p: &Vector3<f64>,
+    directions: [Vector3<f64>; 2],
+    tolerance_m: f64,
+) -> bool {
     let [a, b, c] = triangle.corners;
     let n = (b - a).cross(&(c - a)) / triangle.double_area;
     let is_inside = |[from, to]: [Vector3<f64>; 2]| n.cross(&(to - from)).dot(&(p - from)) >= 0.0;
     n.dot(&(p - a)).abs() <= tolerance_m
-        && n.dot(&along).abs() <= MAX_SINE
+        && directions.iter().all(|along| n.dot(along).abs() <= MAX_SINE)
         && [[a, b], [b, c], [c, a]].into_iter().all(is_inside)
 }
 

@@ -126,7 +126,8 @@ impl OctreeSpace {
     /// are all near the box `swept`.
     fn remember(
         &mut self,
-        (blade, edges): (&BladeSweep, &[BorderEdge]),
+        blade: &BladeSweep,
+        edges: &[BorderEdge],
         incision: u32,
         vertices: &VertexBoxes<'_>,
         (leaves, swept): (&[u32], &[Vector3<f64>; 2]),
@@ -207,12 +208,12 @@ impl OctreeSpace {
         let back_m = BEHIND * cell_m;
         let mut triangles = sweep_from_behind(front, blade, x, back_m);
         let edges = border_edges(front, blade, x);
-        let mut joined = self.borders.join((&edges, &triangles), incision, x, Reach { cell_m, back_m });
+        let mut joined = self.borders.join(&edges, &triangles, incision, x, Reach { cell_m, back_m });
         triangles.append(&mut joined.triangles);
         let swept = swept_box(&triangles);
         let leaves = self.leaves_near(&vertices, &swept);
         let cuts = self.octree.crossed_links_in(team, &leaves, x, (&triangles, incision));
-        self.remember((blade, &edges), incision, &vertices, (&leaves, &swept));
+        self.remember(blade, &edges, incision, &vertices, (&leaves, &swept));
         Ok((cuts, joined.incisions))
     }
 
