@@ -13,7 +13,7 @@ use super::shell::surface::Surface;
 use super::shell::surface_builder::{Change, Material, SurfaceBuilder};
 use super::sweep::bit_marks::Ascending;
 use super::sweep::blade::{BladeSweep, CutError, CutLimits, CutReport, Work};
-use super::sweep::borders::{Borders, Joined, Reach, edges};
+use super::sweep::borders::{Adjoining, Borders, JoinSizes, edges};
 use super::sweep::detect::{Deformed, Detector, Place, Record};
 use super::sweep::front::{Front, Surroundings, sweep_triangles};
 use super::sweep::front_elements::{FrontElements, Meeting};
@@ -37,7 +37,7 @@ const SEPARATION: usize = 20;
 pub struct SweepUnderWay {
     triangles: Vec<SweepTriangle>,
     incision: u32,
-    joined: Joined,
+    joined: Adjoining,
     place: Place,
     most_fragments: usize,
 }
@@ -382,7 +382,7 @@ impl CutMesh {
         let front = self.fronts.get(&incision);
         let mut triangles = sweep_triangles(front, blade, x);
         let edges = edges(front, blade, x);
-        let reach = Reach { cell_m: self.cell_m(), back_m: 0.0 };
+        let reach = JoinSizes { cell_m: self.cell_m(), back_m: 0.0 };
         let mut joined = self.borders.join(&edges, &triangles, incision, x, reach);
         triangles.append(&mut joined.triangles);
         triangles.iter_mut().for_each(|triangle| triangle.exact = !self.inexact);

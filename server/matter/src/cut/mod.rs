@@ -45,7 +45,7 @@ pub use shell::surface::Surface;
 pub use solid::{Solid, SolidCells, SolidOrigin};
 pub use sweep::blade::{BladeSweep, CutError, CutLimits, CutReport, MAX_SEGMENTS, Work};
 pub(crate) use sweep::borders::bounds;
-pub use sweep::borders::{Borders, Edge as BorderEdge, Reach, edges as border_edges};
+pub use sweep::borders::{Borders, Edge as BorderEdge, JoinSizes, edges as border_edges};
 pub use sweep::front::{Front, Surroundings, sweep_from_behind, sweep_triangles};
 pub use sweep::front_elements::FrontRule;
 pub(crate) use sweep::sweep_triangle::SweepTriangle;

@@ -14,8 +14,8 @@ use super::remove::remove;
 use super::select::{Selection, cross, select};
 use super::subdivide::{INSIDE, edges_of_parted, settle_ends, subdivide};
 use crate::cut::{
-    BladeSweep, Borders, CutError, CutMesh, ElementsAround, Front, Reach, border_edges, bounds, sweep_bounds,
-    sweep_triangles,
+    BladeSweep, Borders, CutError, CutMesh, ElementsAround, Front, JoinSizes, border_edges, bounds,
+    sweep_bounds, sweep_triangles,
 };
 use crate::mesh::TetMesh;
 
@@ -163,7 +163,7 @@ impl Snapper {
         let front = self.fronts.get(&incision);
         let mut triangles = sweep_triangles(front, blade, nodes.x);
         let edges = border_edges(front, blade, nodes.x);
-        let reach = Reach { cell_m: mesh.cell_m(), back_m: 0.0 };
+        let reach = JoinSizes { cell_m: mesh.cell_m(), back_m: 0.0 };
         let mut joined = self.borders.join(&edges, &triangles, incision, nodes.x, reach);
         triangles.append(&mut joined.triangles);
         self.joined = joined.incisions;

@@ -54,7 +54,7 @@ type Near<'a> = dyn Fn(&[Vector3<f64>; 2]) -> Vec<[u32; 4]> + 'a;
 
 /// What a sweep joins.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Joined {
+pub struct Adjoining {
     /// Incisions whose border it shares, ascending.
     pub incisions: Vec<u32>,
     /// All incisions near the sweep that are parts of the same cut, these included, ascending.
@@ -77,7 +77,7 @@ struct Line {
 
 /// Sizes that decide what is joined.
 #[derive(Clone, Copy, Debug)]
-pub struct Reach {
+pub struct JoinSizes {
     /// Size of a cell of the body [m].
     pub cell_m: f64,
     /// Distance by which a sweep begins behind the border that it joins [m].
@@ -114,8 +114,8 @@ impl Borders {
         swept: &[SweepTriangle],
         incision: u32,
         x: &[Vector3<f64>],
-        reach: Reach,
-    ) -> Joined {
+        reach: JoinSizes,
+    ) -> Adjoining {
         let drift_m = MAX_DRIFT * reach.cell_m;
         let [low, high] = bounds(edges.iter().flat_map(|edge| &edge.ends));
         let (low, high) = (low.add_scalar(-drift_m), high.add_scalar(drift_m));
@@ -144,7 +144,7 @@ impl Borders {
             self.cut_of.values_mut().filter(|of| **of == cut_of_other).for_each(|of| *of = cut);
         }
         let parts = near.into_iter().filter(|&other| self.cut_of(other) == cut).collect();
-        Joined { incisions: joined.into_iter().collect(), parts, triangles }
+        Adjoining { incisions: joined.into_iter().collect(), parts, triangles }
     }
 
     /// The cut that an incision is a part of: the number of one of its incisions.
@@ -211,7 +211,7 @@ impl Line {
         &self,
         [given, now]: [&[Vector3<f64>]; 2],
         swept: &[SweepTriangle],
-        reach: Reach,
+        reach: JoinSizes,
         triangles: &mut Vec<SweepTriangle>,
     ) -> bool {
         let tolerance_m = TOLERANCE * reach.cell_m;
@@ -261,7 +261,7 @@ impl Edge {
     fn joins(
         &self,
         [given, now]: [&[Vector3<f64>]; 2],
-        reach: Reach,
+        reach: JoinSizes,
         triangles: &mut Vec<SweepTriangle>,
     ) -> bool {
         let tolerance_m = TOLERANCE * reach.cell_m;

@@ -18,8 +18,8 @@ use scindo_algebra::operator::cells::CellStiffness;
 use scindo_algebra::operator::{StiffModes, Stiffness};
 use scindo_algebra::solver::multigrid::Hierarchy;
 use scindo_matter::cut::{
-    BladeSweep, BorderEdge, Borders, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy,
-    Reach, Solid, Surface, Surroundings, Work, border_edges, sweep_from_behind, swept_area,
+    BladeSweep, BorderEdge, Borders, Components, CutError, CutReport, Flaws, Front, IncisionMark, JoinSizes,
+    NewCopy, Solid, Surface, Surroundings, Work, border_edges, sweep_from_behind, swept_area,
 };
 use scindo_matter::element::ElementKind;
 use scindo_matter::element::{MaterialPoint, Point, Points, Simd};
@@ -208,7 +208,7 @@ impl OctreeSpace {
         let back_m = BEHIND * cell_m;
         let mut triangles = sweep_from_behind(front, blade, x, back_m);
         let edges = border_edges(front, blade, x);
-        let mut joined = self.borders.join(&edges, &triangles, incision, x, Reach { cell_m, back_m });
+        let mut joined = self.borders.join(&edges, &triangles, incision, x, JoinSizes { cell_m, back_m });
         triangles.append(&mut joined.triangles);
         let swept = swept_box(&triangles);
         let leaves = self.leaves_near(&vertices, &swept);
