@@ -54,7 +54,7 @@ fn refusal(text: &str) -> String {
 /// Sub-steps of a body are steps of a shorter step of the world, also where nodes are drawn meanwhile.
 #[test]
 fn sub_steps_are_shorter_steps() {
-    for integrator in ["implicit-euler", "bdf2", "newmark", "generalised-alpha", "rk4"] {
+    for integrator in ["implicit-euler", "bdf2", "newmark", "generalised-alpha"] {
         let drawn = "[[body.fix]]\nwhere = { slab = { axis = \"z\", from = 1, to = 1 } }\ndisplacement_m = [0, 0, 0.01]\n";
         let text = BEAM.replace("young_pa = 3e5", &format!("integrator = \"{integrator}\"\nyoung_pa = 3e4"));
         let text = format!("{}{drawn}", text.replace("rayleigh", "displacement_over_s = 0.16\nrayleigh"));
