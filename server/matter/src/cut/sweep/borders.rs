@@ -219,8 +219,10 @@ impl Line {
             let directions = [self.inwards, unit(line[line.len() - 1] - line[0])];
             let lies_in =
                 |p: &Vector3<f64>| swept.iter().any(|triangle| holds(triangle, p, directions, tolerance_m));
-            let covered: Vec<usize> =
-                (1..line.len()).filter(|&k| lies_in(&line[k - 1].lerp(&line[k], 0.5))).collect();
+            let stayed = |k: usize| (now[k] - given[k]).norm() <= MAX_DRIFT * reach.cell_m;
+            let is_covered =
+                |k: &usize| lies_in(&line[k - 1].lerp(&line[*k], 0.5)) && stayed(k - 1) && stayed(*k);
+            let covered: Vec<usize> = (1..line.len()).filter(is_covered).collect();
             let length =
                 |line: &[Vector3<f64>]| line.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum::<f64>();
             let covered_m: f64 = covered.iter().map(|&k| length(&line[k - 1..=k])).sum();

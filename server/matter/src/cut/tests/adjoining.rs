@@ -65,6 +65,18 @@ fn parts_that_overlap_open_what_the_whole_does() {
     }
 }
 
+/// A cut at the place of an earlier one, in tissue that has moved far from there, is another cut.
+#[test]
+fn cuts_at_one_place_in_tissue_that_has_passed_are_two() {
+    for (moved, joined) in [(0.0, vec![1]), (0.1, vec![1]), (0.5, vec![])] {
+        let mut body = Body::unit(6);
+        body.sweep(&patch([-0.1, -0.1], [0.4, 1.1], 0.0), 1);
+        body.x.iter_mut().for_each(|x| x.z += moved);
+        let report = body.sweep(&patch([0.3, -0.1], [0.8, 1.1], 0.0), 2);
+        assert_eq!(report.joined, joined, "moved by {moved} m");
+    }
+}
+
 /// Three through cuts, of which the third goes on across the first: they cut a triangular prism out, and two corners
 /// beside the crossing stay on.
 #[test]
