@@ -138,9 +138,8 @@ impl LinearlyImplicit {
             };
             let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
             let conserves = scheme.is_newmark() && material.law.rotates() && !self.limited;
-            let (step_inputs, solver) = (*inputs, *pcg);
             let inputs =
-                LinearInputs { step: step_inputs, mass_f32, material, solver, inertia, solves, conserves };
+                LinearInputs { step: *inputs, mass_f32, material, solver: *pcg, inertia, solves, conserves };
             let outcome = step.step(team, &mut **stiffness, state, &inputs, spring_forces);
             let StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, work_j, .. } =
                 outcome;
